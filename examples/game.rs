@@ -25,6 +25,7 @@ fn main() {
         .insert_resource(HairProcessTime(60.0))
         // The hero comes first by its importance.
         .insert_resource(HairBudget { milliseconds: 8.0, ..default() })
+        .init_resource::<Saved>()
         .insert_resource(ClearColor(Color::srgb(0.45, 0.52, 0.6)))
         .add_systems(Startup, (world, characters))
         .add_systems(Update, (walk, stroll, turn_heads, follow, weather, barber, report))
@@ -51,9 +52,9 @@ struct Walker(f32);
 #[derive(Component)]
 struct Hat;
 
-/// The hairdo of the saved game.
-#[derive(Resource)]
-struct Saved(Vec<u8>);
+/// The saved game: the hairdos of hair and beard.
+#[derive(Resource, Default)]
+struct Saved(Vec<Vec<u8>>);
 
 const LAKE: Vec3 = Vec3::new(-5.0, 0.0, 0.0);
 const FIRE: Vec3 = Vec3::new(3.0, 0.0, 0.0);
@@ -104,7 +105,7 @@ fn characters(mut commands: Commands, assets: Res<AssetServer>) {
         .spawn((
             Hero { idle: 10.0, ..default() },
             WorldAssetRoot(figure.clone()),
-            WearHair::new(HairPreset::Long),
+            WearHair::new(HairPreset::Long).and(HairPreset::Beard),
             detail,
         ))
         .observe(|failed: On<HairNotWorn>| error!("{}", failed.error));
@@ -246,20 +247,21 @@ fn pause(keys: Res<ButtonInput<KeyCode>>, mut time: ResMut<Time<Virtual>>) {
 fn save_or_load(
     keys: Res<ButtonInput<KeyCode>>,
     hero: Single<Entity, With<Hero>>,
-    saved: Option<Res<Saved>>,
+    mut saved: ResMut<Saved>,
     mut commands: Commands,
 ) -> Result {
     if keys.just_pressed(F5) {
+        saved.0.clear();
         commands.trigger(CaptureHairdo { entity: *hero });
     }
-    if let Some(saved) = saved.filter(|_| keys.just_pressed(F9)) {
-        commands.trigger(ApplyHairdo { entity: *hero, hairdo: Hairdo::from_bytes(&saved.0)? });
+    for bytes in saved.0.iter().filter(|_| keys.just_pressed(F9)) {
+        commands.trigger(ApplyHairdo { entity: *hero, hairdo: Hairdo::from_bytes(bytes)? });
     }
     Ok(())
 }
 
-fn remember(taken: On<HairdoCaptured>, mut commands: Commands) {
-    commands.insert_resource(Saved(taken.hairdo.to_bytes()));
+fn remember(taken: On<HairdoCaptured>, mut saved: ResMut<Saved>) {
+    saved.0.push(taken.hairdo.to_bytes());
 }
 
 fn report(

@@ -57,7 +57,9 @@ fn app(folder: &Path) -> App {
         .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     register(&mut app);
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
-    app.add_observer(|worn: On<HairWorn>, mut outcome: ResMut<Outcome>| outcome.worn = Some(*worn));
+    app.add_observer(|worn: On<HairWorn>, mut outcome: ResMut<Outcome>| {
+        outcome.worn = Some(worn.event().clone());
+    });
     app.add_observer(|not: On<HairNotWorn>, mut outcome: ResMut<Outcome>| {
         outcome.refused = Some(not.error.to_string());
     });
@@ -88,7 +90,7 @@ fn wear(file: &Path, preset: HairPreset) -> Result<Worn, String> {
         if let Some(why) = &outcome.refused {
             return Err(why.clone());
         }
-        if let Some(worn) = outcome.worn {
+        if let Some(worn) = outcome.worn.clone() {
             (0..FRAMES).for_each(|_| app.update());
             return Ok(Worn { app, worn });
         }

@@ -18,6 +18,6 @@ pub mod prelude {
     #[cfg(feature = "render")]
     pub use crate::authoring::wear::ScalpShade;
     pub use crate::authoring::wear::{
-        FacingFrom, HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornAs,
+        FacingFrom, HairBeside, HairNotWorn, HairSource, HairWorn, WearError, WearHair, WornAs,
     };
 }

@@ -321,7 +321,7 @@ fn where_a_face_looks_is_found_and_reported() {
         app.world_mut().entity_mut(root).insert(WearHair { facing, ..default() });
         let reported = wait(&mut app);
         assert_eq!(reported.refused, []);
-        let worn = reported.worn[0];
+        let worn = &reported.worn[0];
         let forward = place_in(&app, worn.hair, root).transform_vector3(Vec3::NEG_Z);
         assert!(forward.normalize().dot(*worn.facing) > 0.999, "{forward} {:?}", worn.facing);
         (worn.facing, worn.facing_from)

@@ -156,7 +156,7 @@ fn solids(world: &mut World, hair: Entity) -> Vec<DrawnSolid> {
 }
 
 /// The figure's root, its bones and its skin.
-fn figure(app: &mut App, mesh: &Mesh) -> (Entity, Vec<Entity>, Entity) {
+pub(super) fn figure(app: &mut App, mesh: &Mesh) -> (Entity, Vec<Entity>, Entity) {
     let world = app.world_mut();
     let (root, bones) = skeleton::spawn(&mut world.commands());
     world.flush();

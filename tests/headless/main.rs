@@ -54,6 +54,7 @@ mod scenes {
 
 mod attack;
 mod avian;
+mod beside;
 mod blink;
 mod bonds;
 mod change;

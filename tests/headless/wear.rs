@@ -26,7 +26,7 @@ pub(super) fn app() -> App {
     let mut app = app_with_meshes(60.0);
     app.init_resource::<Reported>()
         .add_observer(|worn: On<HairWorn>, mut reported: ResMut<Reported>| {
-            reported.worn.push(*worn);
+            reported.worn.push(worn.event().clone());
         })
         .add_observer(|not: On<HairNotWorn>, mut reported: ResMut<Reported>| {
             reported.refused.push((not.entity, not.error.clone()));

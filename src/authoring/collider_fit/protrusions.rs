@@ -10,6 +10,8 @@ use bevy::{
 const LEAST: usize = 10;
 /// Steps toward the least volume; a hundred come within a hundredth of it.
 const STEPS: usize = 100;
+/// What is cut to less than this share of its size is left out.
+const SMALLEST: f32 = 0.5;
 
 /// An ellipsoid: where it is, and its half axes (m).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +38,17 @@ impl ProtrusionRules {
     pub fn scaled(self, size: f32) -> Self {
         let Self { apart, link, longest, out } = self;
         Self { apart: apart * size, link: link * size, longest: longest * size, out: out * size }
+    }
+}
+
+impl Protrusion {
+    /// As much smaller as leaves these points outside; `None` where little is left.
+    pub fn clear_of(self, points: &[Vec3]) -> Option<Self> {
+        let Self { place, radii } = self;
+        let turn = place.rotation.inverse();
+        let share = |p: &Vec3| (turn * (*p - place.translation) / radii).length();
+        let nearest = points.iter().map(share).fold(f32::MAX, f32::min);
+        (nearest > SMALLEST).then(|| Self { place, radii: radii * nearest.min(1.0) })
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{
     error::WearError,
     fall::Fall,
-    make::{Made, MakeInput, make},
+    make::{HairInput, Made, MakeInput, make},
     part::{Cue, MeshPart},
     target::{OwnSolid, Target},
     what::{HairSource, WearHair},
@@ -27,8 +27,8 @@ const SAME_SIZE: f32 = 0.1;
 /// What hair hangs on, to find out who gets the same.
 struct Likeness {
     wear: WearHair,
-    groom: Option<Groom>,
-    before: Option<Arc<Fall>>,
+    hairs: Vec<HairInput>,
+    before: Vec<Arc<Fall>>,
     conditions: SettleConditions,
     shades: bool,
     down: Vec3,
@@ -89,7 +89,7 @@ impl Likeness {
         let solid = |s: &OwnSolid| (s.collider.clone(), s.joint, s.place);
         Self {
             wear: input.wear.bare(),
-            groom: input.groom.clone(),
+            hairs: input.hairs.clone(),
             before: input.before.clone(),
             conditions: input.conditions.clone(),
             shades: input.shades,
@@ -104,19 +104,21 @@ impl Likeness {
     /// The entities of another target for those of this one, where it gets the same hair.
     fn map_to(&self, other: &Self) -> Option<EntityHashMap<Entity>> {
         let is_same_size = (self.size / other.size).ln().abs() < SAME_SIZE;
-        let points = |groom: &Option<Groom>| groom.as_ref().map(|groom| groom.points().as_ptr());
-        let before = |fall: &Option<Arc<Fall>>| fall.as_ref().map(Arc::as_ptr);
+        let points = |groom: &Groom| groom.points().as_ptr();
+        let hair = |of: &HairInput| (of.groom.as_ref().map(points), of.is_kept);
+        let before = |of: &Self| of.before.iter().map(Arc::as_ptr).collect::<Vec<_>>();
         let counts = |of: &Self| [of.entities.len(), of.parts.len(), of.own.len()];
         // An animation has moved the character within its own space.
-        let is_free = self.wear.scalp.is_none() && matches!(self.wear.hair, HairSource::Preset(_));
+        let is_free = self.wear.scalp.is_none()
+            && self.wear.sources().all(|hair| matches!(hair, HairSource::Preset(_)));
         let at = |of: &Self| of.parts.first().map_or(default(), |part| part.at);
         let by = if is_free { at(self) - at(other) } else { default() };
         let is_like = is_same_size
             && counts(self) == counts(other)
             && self.down == other.down
             && self.shades == other.shades
-            && before(&self.before) == before(&other.before)
-            && points(&self.groom) == points(&other.groom)
+            && before(self) == before(other)
+            && self.hairs.iter().map(hair).eq(other.hairs.iter().map(hair))
             && self.wear == other.wear
             && self.conditions == other.conditions
             && self.parts.iter().zip(&other.parts).all(|(a, b)| a.is_like(b, by));

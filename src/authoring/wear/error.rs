@@ -105,13 +105,20 @@ pub enum WearError {
     },
     /// Another entity's preset is worn on this bone or mesh.
     #[error(
-        "the head's bone or mesh wears a preset of {by} already, expected one: remove that WearHair, or \
-         give this one as a groom; on a skinned character, a beard beside hair goes on the entity of the \
-         head's mesh"
+        "the head's bone or mesh wears a preset of {by} already: remove that WearHair, or wear both by one, \
+         as WearHair::new(HairPreset::Short).and(HairPreset::Beard)"
     )]
     Taken {
         /// The other wearer.
         by: Entity,
+    },
+    /// Two hairs of one component that would grow from the same roots: a preset twice, or a groom at the same place.
+    #[error(
+        "{hair} is in WearHair twice: leave it out of WearHair::beside, or give a groom another place there"
+    )]
+    Twice {
+        /// Which.
+        hair: String,
     },
     /// A groom too far from the character's mesh.
     #[error(

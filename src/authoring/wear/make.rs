@@ -75,7 +75,7 @@ const JOINT_CREASE: f32 = 5e-4;
 const EARS: ProtrusionRules =
     ProtrusionRules { apart: -5e-4, link: 0.018, longest: 0.06, out: 1.5e-3 };
 const FINE_POINTS: usize = 15_000;
-/// How far from hair's roots they stay (m): what grows in a solid is pushed out of it.
+/// How far from hair's roots these points are at least (m): what grows in a solid is pushed out of it.
 const BARE: f32 = 8e-3;
 /// Height of a head, as [`Scalp`](crate::authoring::plant::Scalp) measures it (m).
 const HEAD: f32 = 0.133;
@@ -88,14 +88,23 @@ const MAX_ROOT_DISTANCE: f32 = 0.03;
 const UNITS: [f32; 7] = [0.01, 0.001, 0.0254, 0.1, 10.0, 100.0, 1000.0];
 const WIDTHS: core::ops::RangeInclusive<f32> = 0.06..=3.0;
 
+/// What one hair of a wear is made of.
+#[derive(Clone)]
+pub(super) struct HairInput {
+    /// The groom, where one is worn.
+    pub(super) groom: Option<Groom>,
+    /// Whether it is worn already: colliders leave room for it.
+    pub(super) is_kept: bool,
+}
+
 /// The input for making hair.
 pub(super) struct MakeInput {
     pub(super) wear: WearHair,
     pub(super) target: Target,
-    /// The groom, where one is worn.
-    pub(super) groom: Option<Groom>,
-    /// How the hair fell that is worn now.
-    pub(super) before: Option<Arc<Fall>>,
+    /// For each hair of the wear.
+    pub(super) hairs: Vec<HairInput>,
+    /// How the hairs fell that are worn now.
+    pub(super) before: Vec<Arc<Fall>>,
     pub(super) conditions: SettleConditions,
     /// Whether it shades the skin.
     pub(super) shades: bool,
@@ -121,6 +130,23 @@ pub(super) struct Made {
     pub(super) place: Transform,
     /// The meshes that its roots are tied to, each with the transform from its space to the strands'.
     pub(super) skin: Vec<(Entity, Affine3A)>,
+    /// Each hair of the wear; `None` where it is kept.
+    pub(super) hairs: Vec<Option<MadeHair>>,
+    /// The meshes that it was fitted to, and the colliders.
+    pub(super) parts: Vec<Entity>,
+    pub(super) solids: Solids,
+    /// Where the face looks, in the wearer's space, and what shows it.
+    pub(super) facing: (Dir3, FacingFrom),
+    /// What was chosen, to be logged.
+    pub(super) choice: String,
+    /// The meshes of hair that the character came with.
+    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only what is drawn is hidden"))]
+    pub(super) old_hair: Vec<Entity>,
+}
+
+/// One finished hair.
+#[derive(Clone)]
+pub(super) struct MadeHair {
     pub(super) roots: Vec<RootOnMesh>,
     /// Its strands at rest, with their bonds, how they fell if that was found out, and what was reported meanwhile.
     pub(super) strands: Vec<(Strand, Bonds)>,
@@ -139,16 +165,6 @@ pub(super) struct Made {
     pub(super) look: Option<HairLook>,
     /// Fibres for each strand.
     pub(super) fibres: f32,
-    /// The meshes that it was fitted to, and the colliders.
-    pub(super) parts: Vec<Entity>,
-    pub(super) solids: Solids,
-    /// Where the face looks, in the wearer's space, and what shows it.
-    pub(super) facing: (Dir3, FacingFrom),
-    /// What was chosen, to be logged.
-    pub(super) choice: String,
-    /// The meshes of hair that the character came with.
-    #[cfg_attr(not(feature = "render"), allow(dead_code, reason = "only what is drawn is hidden"))]
-    pub(super) old_hair: Vec<Entity>,
 }
 
 impl Made {
@@ -158,7 +174,10 @@ impl Made {
         let joints = self.solids.capsules.iter_mut().map(|(joint, _)| joint);
         let all = core::iter::once(&mut self.parent).chain(skin).chain(joints);
         #[cfg(feature = "render")]
-        let all = all.chain(self.shells.iter_mut().flatten().map(|shell| &mut shell.skin));
+        let all = all.chain(
+            (self.hairs.iter_mut().flatten())
+                .flat_map(|hair| hair.shells.iter_mut().flatten().map(|shell| &mut shell.skin)),
+        );
         for entity in all.chain(&mut self.parts).chain(&mut self.old_hair) {
             if let Some(own) = entities.get(entity) {
                 *entity = *own;
@@ -176,44 +195,60 @@ pub(super) struct Solids {
     pub(super) capsules: Vec<(Entity, (HairCollider, Transform))>,
 }
 
+impl Solids {
+    /// Moves what is in the hair's space into that of another.
+    pub(super) fn move_balls(&mut self, to_other: Mat4) {
+        for (_, place) in &mut self.balls {
+            *place = Transform::from_matrix(to_other * place.to_matrix());
+        }
+    }
+}
+
+/// Where worn hair grows.
+pub(super) struct Rooted {
+    /// The meshes of its roots, each with the transform from its space to the strands'.
+    pub(super) skin: Vec<(Entity, Affine3A)>,
+    pub(super) roots: Vec<RootOnMesh>,
+}
+
 /// The input for fitting colliders to meshes that have changed below hair that is worn.
 pub(super) struct RefitInput {
     pub(super) wear: WearHair,
     pub(super) target: Target,
-    /// The meshes of its roots, each with the transform from its space to the strands'.
-    pub(super) skin: Vec<(Entity, Affine3A)>,
-    pub(super) roots: Vec<RootOnMesh>,
+    /// Where each hair grows.
+    pub(super) hairs: Vec<Rooted>,
     /// The length of the longest strand (m).
     pub(super) longest: f32,
 }
 
-/// Fits colliders again. The hair stays in the space that it was made in.
+/// Fits colliders again, in the space that the first hair was made in and stays in.
 pub(super) fn refit(mut order: RefitInput) -> Result<Solids, WearError> {
     let fitting = fit(&mut order.target.parts, &order.wear)?;
     let part_of = |mesh: &Entity| {
         order.target.parts.iter().find(|part| part.entity == *mesh).ok_or(WearError::NoMesh)
     };
-    let mut places = Vec::new();
-    for (mesh, _) in &order.skin {
-        let part = part_of(mesh)?;
-        let to_hair = fitting.from_wearer * part.to_wearer;
-        let own = part.mesh.attribute(Mesh::ATTRIBUTE_POSITION);
-        let Some(Values::Float32x3(own)) = own else { return Err(WearError::NoMesh) };
-        places.extend(own.iter().map(|p| to_hair.transform_point3(Vec3::from(*p))));
+    let mut roots = Vec::new();
+    for hair in &order.hairs {
+        let mut places = Vec::new();
+        for (mesh, _) in &hair.skin {
+            let part = part_of(mesh)?;
+            let to_hair = fitting.from_wearer * part.to_wearer;
+            let own = part.mesh.attribute(Mesh::ATTRIBUTE_POSITION);
+            let Some(Values::Float32x3(own)) = own else { return Err(WearError::NoMesh) };
+            places.extend(own.iter().map(|p| to_hair.transform_point3(Vec3::from(*p))));
+        }
+        roots.extend(hair.roots.iter().filter_map(|root| {
+            let corner = |i: usize| places.get(root.vertices[i] as usize).copied();
+            let [a, b, c] = [corner(0)?, corner(1)?, corner(2)?];
+            let [u, v, w] = root.weights.to_array();
+            Some(a * u + b * v + c * w)
+        }));
     }
-    let (main, from_mesh) = order.skin.first().ok_or(WearError::NoMesh)?;
+    let first = order.hairs.first().and_then(|hair| hair.skin.first());
+    let (main, from_mesh) = first.ok_or(WearError::NoMesh)?;
     let to_hair = fitting.from_wearer * part_of(main)?.to_wearer;
-    let roots = order.roots.iter().filter_map(|root| {
-        let corner = |i: usize| places.get(root.vertices[i] as usize).copied();
-        let [a, b, c] = [corner(0)?, corner(1)?, corner(2)?];
-        let [u, v, w] = root.weights.to_array();
-        Some(a * u + b * v + c * w)
-    });
-    let mut solids = fit_solids(&fitting, &order.target, roots.collect(), order.longest)?;
-    let back = Mat4::from(*from_mesh * to_hair.inverse());
-    for (_, place) in &mut solids.balls {
-        *place = Transform::from_matrix(back * place.to_matrix());
-    }
+    let mut solids = fit_solids(&fitting, &order.target, roots, order.longest)?;
+    solids.move_balls(Mat4::from(*from_mesh * to_hair.inverse()));
     Ok(solids)
 }
 
@@ -231,7 +266,7 @@ fn fit_solids(
     let reach = longest + MARGIN;
     let balls = match target.own.above.contains(&head) {
         true => Vec::new(),
-        false => balls(fitting, roots.clone(), reach)?,
+        false => balls(fitting, &roots, reach)?,
     };
     // A cape of the same skin is no limb.
     let is_garment = |(i, part): &(usize, &MeshPart)| {
@@ -246,19 +281,16 @@ fn fit_solids(
     Ok(Solids { balls, capsules })
 }
 
-/// Makes the hair, which settles as long as it is `wanted`.
+/// Makes the hairs of a wear, which settle as long as they are `wanted`.
 pub(super) fn make(
     mut order: MakeInput,
     wanted: &(dyn Fn() -> bool + Sync),
 ) -> Result<Made, WearError> {
+    order.wear.check_beside()?;
     let fitting = fit(&mut order.target.parts, &order.wear)?;
-    let grown = match (&order.wear.hair, &order.groom) {
-        (HairSource::Groom { guides, .. }, Some(groom)) => {
-            from_groom(groom, guides, &fitting, &order.wear.place)?
-        }
-        (HairSource::Groom { .. }, None) => return Err(WearError::NoMesh),
-        (HairSource::Preset(preset), _) => plant(*preset, &order.wear, &fitting)?,
-    };
+    let each: Vec<WearHair> = order.wear.each().collect();
+    let grown = each.iter().zip(&order.hairs).map(|(wear, input)| grow(wear, input, &fitting));
+    let grown: Vec<Grown> = grown.collect::<Result<_, _>>()?;
     let part = &order.target.parts[fitting.part()];
     let to_mesh = fitting.skin[0].to_hair.inverse();
     let (parent, place) = match &part.skin {
@@ -269,40 +301,61 @@ pub(super) fn make(
         None => (part.entity, to_mesh),
     };
     let solids = if order.wear.colliders {
-        let strands = &grown.hair.strands;
-        let roots = strands.iter().filter_map(|strand| strand.positions().first().copied());
-        let longest = strands.iter().map(Strand::length).fold(0.0, f32::max);
+        let strands = || grown.iter().flat_map(|grown| &grown.hair.strands);
+        let roots = strands().filter_map(|strand| strand.positions().first().copied());
+        let longest = strands().map(Strand::length).fold(0.0, f32::max);
         fit_solids(&fitting, &order.target, roots.collect(), longest)?
     } else {
         default()
     };
-    let fibres = HairWetting::FIBRES.safe;
-    let planted = &grown.hair.strands;
-    // A saved style is put on as it is.
-    #[cfg(feature = "save")]
-    let is_styled = order.wear.hairdo.is_some();
-    #[cfg(not(feature = "save"))]
-    let is_styled = false;
-    let before = order.before.as_ref().filter(|_| !is_styled);
-    let carried = before.and_then(|before| before.carried(planted));
-    let is_carried = carried.is_some();
-    let (rested, fall) = match carried {
-        _ if is_styled => (Settled::as_planted(planted), None),
-        Some(strands) => (Settled { strands, faults: Vec::new() }, None),
-        None => {
-            let rested = settle(&order, &fitting, &grown, &solids, wanted);
-            let fall = Fall::new(planted, &rested.strands);
-            (rested, Some(Arc::new(fall)))
-        }
-    };
-    #[cfg(feature = "render")]
-    let shells = order.shades.then(|| shade(&order.target, &fitting, &grown));
+    let hairs = grown.into_iter().zip(&each).zip(&order.hairs).map(|((grown, wear), input)| {
+        (!input.is_kept).then(|| finish(&order, wear, grown, &fitting, &solids, wanted))
+    });
     Ok(Made {
         parent,
         place: Transform::from_matrix(place.into()),
         skin: (fitting.skin.iter())
             .map(|of| (order.target.parts[of.part].entity, of.to_hair))
             .collect(),
+        hairs: hairs.collect(),
+        parts: order.target.parts.iter().map(|part| part.entity).collect(),
+        solids,
+        facing: fitting.facing,
+        choice: choice(&fitting, &order.target.parts),
+        old_hair: old_hair(&fitting, &order.target.parts),
+    })
+}
+
+/// Lays a hair, as it settles, as hair of the same roots did before, or as planted where a saved style is put on it.
+fn finish(
+    order: &MakeInput,
+    wear: &WearHair,
+    grown: Grown,
+    fitting: &Fitting,
+    solids: &Solids,
+    wanted: &(dyn Fn() -> bool + Sync),
+) -> MadeHair {
+    let planted = &grown.hair.strands;
+    #[cfg(feature = "save")]
+    let is_styled = wear.hairdo.is_some();
+    #[cfg(not(feature = "save"))]
+    let is_styled = false;
+    let mut before = order.before.iter().filter(|_| !is_styled);
+    let carried = before.find_map(|fall| Some((fall.carried(planted)?, fall.clone())));
+    let is_carried = carried.is_some();
+    let (rested, fall) = match carried {
+        _ if is_styled => (Settled::as_planted(planted), None),
+        Some((strands, fall)) => (Settled { strands, faults: Vec::new() }, Some(fall)),
+        None => {
+            let rested = settle(order, fitting, &grown, solids, wanted);
+            let fall = Fall::new(planted, &rested.strands);
+            (rested, Some(Arc::new(fall)))
+        }
+    };
+    let fibres = HairWetting::FIBRES.safe;
+    #[cfg(feature = "render")]
+    let shells = order.shades.then(|| shade(&order.target, fitting, &grown));
+    MadeHair {
         roots: grown.roots,
         strands: rested.strands,
         fall,
@@ -315,14 +368,9 @@ pub(super) fn make(
         settings: grown.settings,
         preset: grown.preset,
         #[cfg(feature = "render")]
-        look: order.groom.as_ref().and_then(Groom::look),
+        look: grown.look,
         fibres: grown.fibres.clamp(*fibres.start(), *fibres.end()),
-        parts: order.target.parts.iter().map(|part| part.entity).collect(),
-        solids,
-        facing: fitting.facing,
-        choice: choice(&fitting, &order.target.parts),
-        old_hair: old_hair(&fitting, &order.target.parts),
-    })
+    }
 }
 
 /// What shades the skin under it.
@@ -423,10 +471,29 @@ struct Grown {
     roots: Vec<RootOnMesh>,
     settings: Option<PresetSettings>,
     preset: Option<WornPreset>,
+    #[cfg(feature = "render")]
+    look: Option<HairLook>,
     fibres: f32,
 }
 
-fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown, WearError> {
+/// Grows one hair of a wear. One that is kept draws none: only its roots count.
+fn grow(wear: &WearHair, input: &HairInput, fitting: &Fitting) -> Result<Grown, WearError> {
+    match (&wear.hair, &input.groom) {
+        (HairSource::Groom { guides, .. }, Some(groom)) => {
+            from_groom(groom, guides, fitting, &wear.place)
+        }
+        (HairSource::Groom { .. }, None) => Err(WearError::NoMesh),
+        (HairSource::Preset(preset), _) => plant(*preset, wear, fitting, !input.is_kept),
+    }
+}
+
+#[cfg_attr(not(feature = "render"), allow(unused_variables, reason = "followers are drawn"))]
+fn plant(
+    preset: HairPreset,
+    wear: &WearHair,
+    fitting: &Fitting,
+    is_drawn: bool,
+) -> Result<Grown, WearError> {
     let length = WornPreset::LENGTH.named("WearHair::length").check(wear.length)?;
     let worn = WornPreset { seed: wear.seed, length, ..WornPreset::of(preset) };
     let mut planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
@@ -461,7 +528,7 @@ fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown
             scalp: fitting.scalp,
             hairline: (wear.hairline.map(Ranged::checked).transpose()?)
                 .unwrap_or_else(|| preset.hairline()),
-            count: preset.settings().followers.count,
+            count: if is_drawn { preset.settings().followers.count } else { 0 },
             seed: wear.seed,
         }
         .plant(&planted, &mesh, &of_head)?,
@@ -472,6 +539,8 @@ fn plant(preset: HairPreset, wear: &WearHair, fitting: &Fitting) -> Result<Grown
         roots: planted.roots,
         settings: Some(preset.settings()),
         preset: Some(worn),
+        #[cfg(feature = "render")]
+        look: None,
         fibres: HUMAN_DENSITY / planting.density,
     })
 }
@@ -498,6 +567,8 @@ fn from_groom(
         roots,
         settings: None,
         preset: None,
+        #[cfg(feature = "render")]
+        look: groom.look(),
     })
 }
 
@@ -536,7 +607,7 @@ fn median(values: &mut [f32]) -> Option<f32> {
 /// joints, all of it that hair reaches.
 fn balls(
     fitting: &Fitting,
-    roots: Vec<Vec3>,
+    roots: &[Vec3],
     reach: f32,
 ) -> Result<Vec<(HairCollider, Transform)>, WearError> {
     let cropped = cropped(&fitting.mesh, reach);
@@ -553,16 +624,18 @@ fn balls(
     let balls = inscribed_balls(&places, |i| is_on_head(&points[i]), &rules);
     let skin = surface_points(&cropped, FINE_POINTS)?;
     let size = height / HEAD;
-    let roots = KdTree::new(roots.into_iter().zip(0u32..));
+    let near_roots = KdTree::new(roots.iter().copied().zip(0u32..));
     let clear = (0, (BARE * size).powi(2));
-    let is_bare = |p: &SurfacePoint| roots.nearer_than(p.at, clear) == clear;
+    let is_bare = |p: &SurfacePoint| near_roots.nearer_than(p.at, clear) == clear;
     let bare = skin.iter().filter(|p| is_on_head(p) && is_bare(p)).map(|p| p.at);
-    let ears = protrusions(bare, &balls, &EARS.scaled(size));
+    let ears = protrusions(bare, &balls, &EARS.scaled(size)).into_iter();
+    // Around what is bare there may be roots within: those of a sideburn in the ellipsoid around ear and temple.
+    let ears = ears.filter_map(|ear| ear.clear_of(roots));
     let balls = balls.into_iter().map(|ball| {
         let place = Transform::from_translation(ball.center.into());
         Ok((HairCollider::sphere(ball.radius())?, place))
     });
-    let ears = ears.into_iter().map(|ear| Ok((HairCollider::ellipsoid(ear.radii)?, ear.place)));
+    let ears = ears.map(|ear| Ok((HairCollider::ellipsoid(ear.radii)?, ear.place)));
     balls.chain(ears).collect()
 }
 

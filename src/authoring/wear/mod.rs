@@ -5,7 +5,8 @@
 //! loads, makes the hair on the async compute task pool, ties its roots, fits colliders to head and
 //! body, bones with colliders of their own left out, lets it settle, and spawns it as a [`Hair`](crate::Hair) of its
 //! own. [`HairWorn`] is triggered when it is there, [`HairNotWorn`] when it cannot be. Change the
-//! component and the hair is swapped, once the new one is ready; remove it and the hair is removed.
+//! component and the hair is swapped, once the new one is ready; remove it and the hair is removed. Several hairs of one
+//! component, such as a beard beside hair, are made together on one set of colliders, and come and go at once.
 //!
 //! | step | where |
 //! |---|---|
@@ -48,7 +49,7 @@ pub use error::WearError;
 pub use facing::FacingFrom;
 #[cfg(feature = "render")]
 pub use shade::ScalpShade;
-pub use what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs};
+pub use what::{HairBeside, HairNotWorn, HairSource, HairWorn, WearHair, WornAs};
 
 use crate::{
     authoring::attach::MadeAgain,
@@ -75,6 +76,7 @@ impl Plugin for WearPlugin {
         app.init_resource::<alike::Makings>()
             .register_type::<WearHair>()
             .register_type::<HairSource>()
+            .register_type::<HairBeside>()
             .register_type::<WornAs>()
             .register_type::<target::Fitted>()
             .register_type::<FacingFrom>()

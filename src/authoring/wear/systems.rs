@@ -5,7 +5,7 @@ use super::{
     error::{SEARCH_TIME, WearError},
     facing::FacingFrom,
     fall::Fall,
-    make::{Made, MakeInput, RefitInput, Solids, refit},
+    make::{HairInput, Made, MadeHair, MakeInput, RefitInput, Rooted, Solids, refit},
     missing::missing_asset,
     target::{Characters, Fitted, Search, Target},
     what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs},
@@ -53,19 +53,33 @@ pub(super) struct Wearing {
     stage: WearStage,
     /// Whether another is wanted than the one that is being made, which is put on first.
     lags: bool,
-    /// How the worn hair fell when it settled.
-    fall: Option<Arc<Fall>>,
-    /// Whether the worn hair took over how other hair lay, and time has stood still since; and whether what is being
-    /// made is the same hair, settled.
-    is_carried: bool,
+    /// Whether what is being made is the worn hair, settled.
     settles: bool,
     /// The bone or mesh that it is worn on.
     head: Option<Entity>,
-    /// The worn hair.
-    worn: Option<Entity>,
+    /// The worn hairs, in the component's order.
+    worn: Vec<Worn>,
     /// Whether its meshes have changed since its colliders were fitted, and the fit that runs.
     has_changed: bool,
     refit: Option<Task<Result<Solids, WearError>>>,
+}
+
+/// A worn hair.
+#[derive(Clone)]
+struct Worn {
+    hair: Entity,
+    /// How it fell when it settled.
+    fall: Option<Arc<Fall>>,
+    /// Whether it took over how other hair lay, and time has stood still since.
+    is_carried: bool,
+    /// Whether what it was made of is another since: its groom, or its mesh.
+    is_stale: bool,
+}
+
+impl Worn {
+    fn found(hair: Entity) -> Self {
+        Self { hair, fall: None, is_carried: false, is_stale: false }
+    }
 }
 
 #[derive(Default)]
@@ -77,8 +91,8 @@ enum WearStage {
     Searching { seconds: f32, reported: bool },
     /// Its hair is to be made.
     Found(Box<Found>),
-    /// Its hair is being made.
-    Making(Share),
+    /// Its hair is being made, but for those of the worn hairs that are kept.
+    Making(Share, Vec<Option<Entity>>),
     /// It has its hair, or cannot have it.
     Done,
 }
@@ -87,7 +101,8 @@ enum WearStage {
 struct Found {
     wear: WearHair,
     target: Target,
-    groom: Option<Groom>,
+    /// For each hair.
+    grooms: Vec<Option<Groom>>,
 }
 
 impl Wearing {
@@ -100,14 +115,14 @@ impl Wearing {
     }
 }
 
-/// Despawns worn hair with the colliders that were fitted for it.
+/// Despawns worn hairs, and the colliders that were fitted for the wearer.
 fn despawn_worn(
     commands: &mut Commands,
     wearer: Entity,
-    hair: Entity,
+    hairs: impl IntoIterator<Item = Entity>,
     fitted: &Query<(Entity, &Fitted)>,
 ) {
-    commands.entity(hair).try_despawn();
+    hairs.into_iter().for_each(|hair| commands.entity(hair).try_despawn());
     #[cfg(feature = "render")]
     super::old_hair::show(commands, wearer);
     for (collider, _) in fitted.iter().filter(|(_, fitted)| fitted.wearer == wearer) {
@@ -126,10 +141,14 @@ pub(super) fn leave(
 ) {
     let wearer = gone.entity;
     let Ok((wearing, worn)) = wearers.get(wearer) else { return };
-    // One that has just been copied has not found its hair yet.
-    let named = || worn.and_then(|worn| worn.iter().find(|hair| made.contains(*hair)));
-    if let Some(hair) = wearing.worn.or_else(named) {
-        despawn_worn(&mut commands, wearer, hair, &fitted);
+    let mut hairs: Vec<Entity> = wearing.worn.iter().map(|worn| worn.hair).collect();
+    if hairs.is_empty() {
+        // One that has just been copied has not found its hair yet.
+        let named = worn.into_iter().flat_map(|worn| worn.iter());
+        hairs.extend(named.filter(|hair| made.contains(*hair)));
+    }
+    if !hairs.is_empty() {
+        despawn_worn(&mut commands, wearer, hairs, &fitted);
     }
 }
 
@@ -139,12 +158,15 @@ pub(super) fn find_worn(
     made: Query<(Entity, &WornAs, Option<&ChildOf>)>,
 ) {
     for (mut wearing, worn) in &mut wearers {
-        if let Some((hair, worn, on)) = made.iter_many(worn.iter()).next() {
+        let mut all: Vec<_> = made.iter_many(worn.iter()).collect();
+        all.sort_by_key(|(_, worn, _)| worn.which);
+        all.dedup_by_key(|(_, worn, _)| worn.which);
+        if let Some((_, _, on)) = all.first() {
             *wearing = Wearing {
-                wanted: Some(worn.wear.clone()),
+                wanted: WearHair::of_each(all.iter().map(|(_, worn, _)| worn.wear.clone())),
                 stage: WearStage::Done,
                 head: on.map(ChildOf::parent),
-                worn: Some(hair),
+                worn: all.iter().map(|(hair, ..)| Worn::found(*hair)).collect(),
                 ..default()
             };
         }
@@ -181,17 +203,17 @@ pub(super) fn detect_changes(
     let stands_still = time.is_some_and(|time| time.is_paused());
     for (wear, mut wearing) in &mut wearers {
         // In time that goes on, hair settles before the eyes.
-        wearing.bypass_change_detection().is_carried &= stands_still;
+        for worn in &mut wearing.bypass_change_detection().worn {
+            worn.is_carried &= stands_still;
+        }
         let mut is_other = wear.is_changed() && wearing.wanted.as_ref() != Some(&*wear);
-        if is_other
-            && let Some(hair) = &wearing.worn
-            && matches!(wearing.stage, WearStage::Done)
-            && let Some(before) =
-                wearing.wanted.as_ref().filter(|before| before.is_same_hair(&wear))
-        {
-            restyle(&mut commands, *hair, before, &wear);
-            if let Ok((mut worn, _)) = hairs.get_mut(*hair) {
-                worn.wear = WearHair::clone(&wear);
+        let is_same = || wearing.wanted.as_ref().is_some_and(|before| before.is_same_hair(&wear));
+        let is_worn = !wearing.worn.is_empty() && matches!(wearing.stage, WearStage::Done);
+        if is_other && is_worn && is_same() {
+            for (own, wear) in wearing.worn.iter().zip(wear.each()) {
+                if let Ok((mut worn, _)) = hairs.get_mut(own.hair) {
+                    restyle(&mut commands, own.hair, &mut worn, wear);
+                }
             }
             wearing.wanted = Some(WearHair::clone(&wear));
             is_other = false;
@@ -200,38 +222,46 @@ pub(super) fn detect_changes(
             (wearing.stage, wearing.settles) = (WearStage::Done, false);
         }
         // A slider that is dragged: what is being made is shown before the next is begun.
-        let is_making = matches!(wearing.stage, WearStage::Making(_));
+        let is_making = matches!(wearing.stage, WearStage::Making(..));
         let is_variation = || wearing.wanted.as_ref().is_some_and(|old| old.is_variation(&wear));
         if is_other && is_making && is_variation() {
             wearing.lags = !wearing.wanted.as_ref().is_some_and(|old| old.is_same_hair(&wear));
             is_other = false;
         }
-        let is_reloaded = match &wear.hair {
+        let is_reloaded = |hair: &HairSource| match hair {
             HairSource::Groom { groom, .. } => changed.contains(&groom.id()),
             HairSource::Preset(_) => false,
         };
         let is_overdue = wearing.lags && matches!(wearing.stage, WearStage::Done);
-        let is_gone = wearing.worn.as_ref().is_some_and(|hair| !hairs.contains(*hair));
         let is_done = matches!(wearing.stage, WearStage::Done);
-        let has_lost_roots = is_done
-            && wearing.worn.is_some_and(|hair| {
-                hairs
-                    .get_mut(hair)
-                    .is_ok_and(|(_, mut tied)| tied.bypass_change_detection().take_lost())
-            });
+        let (mut is_gone, mut has_lost_roots) = (false, false);
+        for own in &mut wearing.bypass_change_detection().worn {
+            let Ok((worn, mut tied)) = hairs.get_mut(own.hair) else {
+                is_gone = true;
+                continue;
+            };
+            own.is_stale |= is_reloaded(&worn.wear.hair);
+            if is_done && tied.bypass_change_detection().take_lost() {
+                (own.is_stale, has_lost_roots) = (true, true);
+            }
+        }
+        let is_reloaded = wear.sources().any(is_reloaded);
+        let is_to_settle = || wearing.worn.iter().any(|worn| worn.is_carried) && !wearing.settles;
         if is_reloaded && is_making {
             wearing.lags = true;
         } else if is_other || is_overdue || is_reloaded || has_lost_roots || (is_gone && is_done) {
             wearing.begin(&wear);
-        } else if wearing.is_carried && is_done && wear.at.is_none() {
+        } else if is_done && wear.at.is_none() && is_to_settle() {
             wearing.begin(&wear);
-            (wearing.is_carried, wearing.settles) = (false, true);
+            wearing.settles = true;
         }
     }
 }
 
-/// Applies changes of look, dye and [`HairStyle`] to worn hair.
-fn restyle(commands: &mut Commands, hair: Entity, before: &WearHair, wear: &WearHair) {
+/// Makes worn hair what is wanted now: applies changes of look, dye and [`HairStyle`].
+fn restyle(commands: &mut Commands, hair: Entity, worn: &mut WornAs, wear: WearHair) {
+    let before = core::mem::replace(&mut worn.wear, wear);
+    let wear = &worn.wear;
     let mut hair = commands.entity(hair);
     if before.look != wear.look
         && let Some(look) = wear.look.clone()
@@ -252,6 +282,8 @@ fn restyle(commands: &mut Commands, hair: Entity, before: &WearHair, wear: &Wear
     }
 }
 
+type Wearers<'w, 's> = Query<'w, 's, (Entity, &'static WearHair, &'static mut Wearing)>;
+
 /// Finds the heads of wearers.
 #[derive(SystemParam)]
 pub(super) struct Finder<'w, 's> {
@@ -259,7 +291,7 @@ pub(super) struct Finder<'w, 's> {
     time: Option<Res<'w, Time<Real>>>,
     characters: Characters<'w, 's>,
     grooms: Option<Res<'w, Assets<Groom>>>,
-    wearers: Query<'w, 's, (Entity, &'static WearHair, &'static mut Wearing)>,
+    wearers: Wearers<'w, 's>,
     faults: MessageWriter<'w, HairFault>,
 }
 
@@ -274,7 +306,7 @@ impl Finder<'_, '_> {
         let Self { mut commands, time, characters, grooms, mut wearers, mut faults } = self;
         // The wearer of a preset on each head.
         let mut taken: HashMap<Entity, Entity> = (wearers.iter())
-            .filter(|(_, wear, _)| matches!(wear.hair, HairSource::Preset(_)))
+            .filter(|(_, wear, _)| has_preset(wear))
             .filter_map(|(wearer, _, wearing)| Some((wearing.head?, wearer)))
             .collect();
         let start = Instant::now();
@@ -294,7 +326,7 @@ impl Finder<'_, '_> {
                     }
                     (seconds, reported)
                 }
-                WearStage::Found(_) | WearStage::Making(_) | WearStage::Done => continue,
+                WearStage::Found(_) | WearStage::Making(..) | WearStage::Done => continue,
             };
             // The scene may change: it is searched again.
             let mut failed = |error: WearError| {
@@ -303,21 +335,21 @@ impl Finder<'_, '_> {
                 }
                 WearStage::Searching { seconds: SEARCH_TIME, reported: true }
             };
-            let groom = match &wear.hair {
-                HairSource::Preset(_) => None,
+            let groom = |hair: &HairSource| match hair {
+                HairSource::Preset(_) => Ok(None),
                 HairSource::Groom { groom, .. } => {
-                    match grooms.as_ref().and_then(|grooms| grooms.get(groom)) {
-                        Some(groom) => Some(groom),
-                        None => {
-                            wearing.stage = match characters.failure(groom.id().untyped()) {
-                                Some(reason) => {
-                                    failed(WearError::NotLoaded { what: "groom", reason })
-                                }
-                                None => WearStage::Searching { seconds, reported },
-                            };
-                            continue;
-                        }
-                    }
+                    let loaded = grooms.as_ref().and_then(|grooms| grooms.get(groom));
+                    loaded.cloned().map(Some).ok_or(groom.id())
+                }
+            };
+            let grooms = match wear.sources().map(groom).collect::<Result<Vec<_>, _>>() {
+                Ok(grooms) => grooms,
+                Err(missing) => {
+                    wearing.stage = match characters.failure(missing.untyped()) {
+                        Some(reason) => failed(WearError::NotLoaded { what: "groom", reason }),
+                        None => WearStage::Searching { seconds, reported },
+                    };
+                    continue;
                 }
             };
             wearing.stage = match characters.search(wearer, wear) {
@@ -331,7 +363,7 @@ impl Finder<'_, '_> {
                 Search::Nothing => WearStage::Searching { seconds, reported },
                 Search::Failed(error) => failed(error),
                 Search::Found(target) => {
-                    let is_preset = matches!(wear.hair, HairSource::Preset(_));
+                    let is_preset = has_preset(wear);
                     match taken.get(&target.head).filter(|by| is_preset && **by != wearer) {
                         Some(&by) => failed(WearError::Taken { by }),
                         None => {
@@ -339,8 +371,8 @@ impl Finder<'_, '_> {
                                 taken.insert(target.head, wearer);
                             }
                             wearing.head = Some(target.head);
-                            let (wear, groom) = (wear.clone(), groom.cloned());
-                            WearStage::Found(Box::new(Found { wear, target, groom }))
+                            let wear = wear.clone();
+                            WearStage::Found(Box::new(Found { wear, target, grooms }))
                         }
                     }
                 }
@@ -353,14 +385,16 @@ impl Finder<'_, '_> {
     }
 }
 
+fn has_preset(wear: &WearHair) -> bool {
+    wear.sources().any(|hair| matches!(hair, HairSource::Preset(_)))
+}
+
 /// Starts to make hair for heads that were found.
 pub(super) fn start(world: &mut World, all: &mut QueryState<(Entity, &mut Wearing)>) {
     let found = all.iter_mut(world).filter_map(|(wearer, mut wearing)| {
         let wearing = wearing.bypass_change_detection();
         match core::mem::take(&mut wearing.stage) {
-            WearStage::Found(found) => {
-                Some((wearer, found, wearing.fall.clone().filter(|_| !wearing.settles)))
-            }
+            WearStage::Found(found) => Some((wearer, found)),
             stage => {
                 wearing.stage = stage;
                 None
@@ -368,19 +402,40 @@ pub(super) fn start(world: &mut World, all: &mut QueryState<(Entity, &mut Wearin
         }
     });
     let found: Vec<_> = found.collect();
-    for (wearer, found, fall) in found {
-        let Found { wear, target, groom } = *found;
+    for (wearer, found) in found {
+        let Some(wearing) = world.get::<Wearing>(wearer) else { continue };
+        let kept = kept(world, wearing, &found);
+        let falls = wearing.worn.iter().filter(|_| !wearing.settles);
+        let before = falls.filter_map(|worn| worn.fall.clone()).collect();
+        let Found { wear, target, grooms } = *found;
+        let hairs = grooms.into_iter().zip(&kept);
+        let hairs = hairs.map(|(groom, kept)| HairInput { groom, is_kept: kept.is_some() });
+        let hairs = hairs.collect();
         let conditions = SettleConditions::of(world, wearer);
         #[cfg(feature = "render")]
         let shades = super::shade::shades(world, wearer);
         #[cfg(not(feature = "render"))]
         let shades = false;
-        let input = MakeInput { wear, target, groom, before: fall, conditions, shades };
+        let input = MakeInput { wear, target, hairs, before, conditions, shades };
         let share = world.resource_mut::<Makings>().share(input);
         if let Some(mut wearing) = world.get_mut::<Wearing>(wearer) {
-            wearing.stage = WearStage::Making(share);
+            wearing.stage = WearStage::Making(share, kept);
         }
     }
+}
+
+/// For each hair that is to be worn the one that is it already, on the same meshes.
+fn kept(world: &World, wearing: &Wearing, found: &Found) -> Vec<Option<Entity>> {
+    let is_as_made = |worn: &&Worn| !worn.is_stale && !(wearing.settles && worn.is_carried);
+    let worn = wearing.worn.iter().filter(is_as_made);
+    let worn: Vec<_> =
+        worn.filter_map(|worn| Some((worn.hair, world.get::<WornAs>(worn.hair)?))).collect();
+    let parts = || found.target.parts.iter().map(|part| &part.entity);
+    let own = |wear: WearHair| {
+        let is_it = |is: &WornAs| is.wear.is_same_hair(&wear) && is.parts.iter().eq(parts());
+        worn.iter().find(|(_, is)| is_it(is)).map(|(hair, _)| *hair)
+    };
+    found.wear.each().map(own).collect()
 }
 
 fn report_failure(
@@ -409,23 +464,21 @@ fn report_no_mesh(world: &mut World, wearer: Entity) {
 #[derive(SystemParam)]
 pub(super) struct Hairdresser<'w, 's> {
     commands: Commands<'w, 's>,
-    wearers: Query<'w, 's, (Entity, &'static WearHair, &'static mut Wearing)>,
     entities: Query<'w, 's, ()>,
+    hairs: Query<'w, 's, (&'static mut WornAs, &'static Transform)>,
     fitted: Query<'w, 's, (Entity, &'static Fitted)>,
     wetting: Option<Res<'w, HairDefault<HairWetting>>>,
     faults: MessageWriter<'w, HairFault>,
 }
 
 /// Puts on what is ready.
-pub(super) fn put_on(dresser: Hairdresser) {
-    dresser.put_on(None);
+pub(super) fn put_on(mut dresser: Hairdresser, wearers: Wearers) {
+    dresser.put_on(wearers, None);
 }
 
 impl Hairdresser<'_, '_> {
     /// What is ready, as much as a frame has time for; or what is due by now, which is waited for.
-    fn put_on(self, due: Option<Duration>) {
-        let Self { mut commands, mut wearers, entities, fitted, wetting, mut faults } = self;
-        let wetting = wetting.as_ref().map(|default| default.0).unwrap_or_default();
+    fn put_on(&mut self, mut wearers: Wearers, due: Option<Duration>) {
         let mut spawned = 0;
         for (wearer, wear, mut wearing) in &mut wearers {
             let is_meant = match due {
@@ -433,48 +486,162 @@ impl Hairdresser<'_, '_> {
                 None => wear.at.is_none() && spawned < MOST_STRANDS,
             };
             let is_ready = |stage: &WearStage| match stage {
-                WearStage::Making(share) => share.is_ready(due.is_some()),
+                WearStage::Making(share, _) => share.is_ready(due.is_some()),
                 _ => false,
             };
             if !is_meant || !is_ready(&wearing.stage) {
                 continue;
             }
             let stage = core::mem::replace(&mut wearing.stage, WearStage::Done);
-            let WearStage::Making(share) = stage else { continue };
+            let WearStage::Making(share, kept) = stage else { continue };
             let Some(ready) = share.take() else { continue };
             match ready {
-                Ok(mut made)
-                    if entities.contains(made.parent)
-                        && made.skin.iter().all(|(mesh, _)| entities.contains(*mesh)) =>
-                {
-                    if let Some(old) = wearing.worn.take() {
-                        despawn_worn(&mut commands, wearer, old, &fitted);
-                    }
-                    spawned += made.strands.len();
-                    let ((facing, facing_from), mesh) = (made.facing, made.skin[0].0);
-                    log_made(wearer, &made);
-                    let fall = made.fall.take();
-                    (wearing.is_carried, wearing.settles) = (made.is_carried, false);
-                    let of_strands = core::mem::take(&mut made.faults);
-                    // What was made, looking as is wanted now.
-                    let made_as = wearing.wanted.clone().unwrap_or_else(|| wear.clone());
-                    let made_as = made_as.looking_like(wear);
-                    wearing.wanted = Some(made_as.clone());
-                    let hair = spawn_hair(&mut commands, wearer, &made_as, made, wetting);
-                    faults.write_batch(of_strands.into_iter().map(|fault| fault.of(hair)));
-                    let event = HairWorn { entity: wearer, hair, mesh, facing, facing_from };
-                    commands.trigger(event);
-                    wearing.worn = Some(hair);
-                    wearing.fall = fall.or(wearing.fall.take());
+                Ok(made) if self.can_be_worn(&made, &kept) => {
+                    spawned +=
+                        made.hairs.iter().flatten().map(|new| new.strands.len()).sum::<usize>();
+                    self.dress(wearer, wear, &mut wearing, made, &kept);
                 }
                 // The scene was despawned while the hair was made.
                 Ok(_) => wearing.begin(wear),
                 Err(error) => {
                     wearing.head = None;
-                    report_failure(&mut commands, &mut faults, wearer, error);
+                    report_failure(&mut self.commands, &mut self.faults, wearer, error);
                 }
             }
         }
+    }
+
+    /// Whether what it hangs on, and the worn hairs that are kept, are there.
+    fn can_be_worn(&self, made: &Made, kept: &[Option<Entity>]) -> bool {
+        let mut of_head = made.skin.iter().map(|(mesh, _)| *mesh).chain([made.parent]);
+        of_head.all(|entity| self.entities.contains(entity))
+            && kept.iter().flatten().all(|hair| self.hairs.contains(*hair))
+    }
+
+    /// Puts on what was made, at once.
+    fn dress(
+        &mut self,
+        wearer: Entity,
+        wear: &WearHair,
+        wearing: &mut Wearing,
+        mut made: Made,
+        kept: &[Option<Entity>],
+    ) {
+        log_made(wearer, &made);
+        let before = core::mem::take(&mut wearing.worn);
+        let gone = before.iter().map(|worn| worn.hair).filter(|hair| !kept.contains(&Some(*hair)));
+        despawn_worn(&mut self.commands, wearer, gone, &self.fitted);
+        #[cfg(feature = "render")]
+        if wear.hides_old_hair {
+            super::old_hair::hide(&mut self.commands, wearer, &made.old_hair);
+        }
+        // What was made, looking as is wanted now.
+        let made_as = wearing.wanted.take().unwrap_or_else(|| wear.clone()).looking_like(wear);
+        let mut solids = core::mem::take(&mut made.solids);
+        let hairs = core::mem::take(&mut made.hairs).into_iter().zip(made_as.each());
+        for (which, ((new, wear), kept)) in hairs.zip(kept).enumerate() {
+            let worn = match (new, kept) {
+                (Some(new), _) => {
+                    let fall = new.fall.clone();
+                    Worn {
+                        is_carried: new.is_carried,
+                        fall: fall.or_else(|| before.get(which)?.fall.clone()),
+                        // A groom that was loaded again meanwhile.
+                        is_stale: wearing.lags && matches!(wear.hair, HairSource::Groom { .. }),
+                        hair: self.spawn(wearer, &made, new, wear, which),
+                    }
+                }
+                (None, Some(hair)) => {
+                    let Ok((mut is, place)) = self.hairs.get_mut(*hair) else { continue };
+                    if which == 0 && *place != made.place {
+                        solids.move_balls(place.to_matrix().inverse() * made.place.to_matrix());
+                    }
+                    restyle(&mut self.commands, *hair, &mut is, wear);
+                    is.which = which;
+                    let own = before.iter().find(|worn| worn.hair == *hair);
+                    own.cloned().unwrap_or_else(|| Worn::found(*hair))
+                }
+                (None, None) => continue,
+            };
+            wearing.worn.push(worn);
+        }
+        wearing.wanted = Some(made_as);
+        wearing.settles = false;
+        let mut hairs = wearing.worn.iter().map(|worn| worn.hair);
+        let Some(hair) = hairs.next() else { return };
+        spawn_solids(&mut self.commands, wearer, hair, solids);
+        let ((facing, facing_from), mesh) = (made.facing, made.skin[0].0);
+        let beside = hairs.collect();
+        let event = HairWorn { entity: wearer, hair, beside, mesh, facing, facing_from };
+        self.commands.trigger(event);
+    }
+
+    /// Spawns a hair of what was made.
+    fn spawn(
+        &mut self,
+        wearer: Entity,
+        made: &Made,
+        new: MadeHair,
+        wear: WearHair,
+        which: usize,
+    ) -> Entity {
+        let (mesh, strands_from_mesh) = made.skin[0];
+        let others =
+            made.skin[1..].iter().map(|&(mesh, from)| OtherMesh { mesh, strands_from_mesh: from });
+        let roots = RootsOnMesh {
+            mesh: Some(mesh),
+            roots: new.roots,
+            strands_from_mesh,
+            others: others.collect(),
+        };
+        let wetting = self.wetting.as_ref().map(|default| default.0).unwrap_or_default();
+        let wetting = HairWetting { fibres: new.fibres, ..wetting };
+        let is = WornAs { wear: wear.clone(), which, parts: made.parts.clone() };
+        let is = (Hair, made.place, ChildOf(made.parent), WornBy(wearer), is, wetting, roots);
+        let mut hair = self.commands.spawn(is);
+        if let Some(mut settings) = new.settings {
+            settings.wetting = wetting;
+            hair.insert(settings);
+        }
+        if let Some(preset) = new.preset {
+            hair.insert(preset);
+        }
+        // It has settled.
+        hair.remove::<Settling>();
+        #[cfg(feature = "render")]
+        {
+            if let Some(look) = new.look {
+                hair.insert(look);
+            }
+            if !new.followers.0.is_empty() {
+                hair.insert(new.followers);
+            }
+            if let Some(shells) = new.shells {
+                hair.insert(super::shade::Shading::Made(shells));
+            }
+        }
+        let hair = hair.id();
+        let strands =
+            new.strands.into_iter().map(move |(strand, bonds)| (StrandOf(hair), strand, bonds));
+        self.commands.spawn_batch(strands.collect::<Vec<_>>());
+        let mut own = self.commands.entity(hair);
+        #[cfg(feature = "save")]
+        if let Some(hairdo) = wear.hairdo {
+            own.queue(hairdo.into_fitting_command());
+        }
+        // These override the hairdo's.
+        if let Some(look) = wear.look {
+            own.insert(look);
+        }
+        if let Some(dye) = wear.dye {
+            own.insert(dye);
+        }
+        if let Some(style) = wear.style {
+            own.insert(style);
+        }
+        self.commands.queue(move |world: &mut World| PassedTypes::pass(world, wearer, hair));
+        self.faults.write_batch(new.faults.into_iter().map(|fault| fault.of(hair)));
+        hair
     }
 }
 
@@ -500,7 +667,9 @@ pub(super) fn put_on_due(world: &mut World, all: &mut QueryState<(&WearHair, &mu
         );
         let _ = world.run_system_cached(start);
         let _ = world.run_system_cached_with(
-            |In(now): In<Duration>, dresser: Hairdresser| dresser.put_on(Some(now)),
+            |In(now): In<Duration>, mut dresser: Hairdresser, wearers: Wearers| {
+                dresser.put_on(wearers, Some(now));
+            },
             now,
         );
     }
@@ -524,74 +693,6 @@ fn log_made(wearer: Entity, made: &Made) {
              taken to look along -Z: set WearHair::facing"
         );
     }
-}
-
-fn spawn_hair(
-    commands: &mut Commands,
-    wearer: Entity,
-    wear: &WearHair,
-    made: Made,
-    wetting: HairWetting,
-) -> Entity {
-    let (mesh, strands_from_mesh) = made.skin[0];
-    let others =
-        made.skin[1..].iter().map(|&(mesh, from)| OtherMesh { mesh, strands_from_mesh: from });
-    let roots = RootsOnMesh {
-        mesh: Some(mesh),
-        roots: made.roots,
-        strands_from_mesh,
-        others: others.collect(),
-    };
-    #[cfg(feature = "render")]
-    if wear.hides_old_hair {
-        super::old_hair::hide(commands, wearer, &made.old_hair);
-    }
-    let is = (WornBy(wearer), WornAs { wear: wear.clone(), parts: made.parts });
-    let wetting = HairWetting { fibres: made.fibres, ..wetting };
-    let mut hair = commands.spawn((Hair, made.place, ChildOf(made.parent), is, wetting, roots));
-    if let Some(mut settings) = made.settings {
-        settings.wetting = wetting;
-        hair.insert(settings);
-    }
-    if let Some(preset) = made.preset {
-        hair.insert(preset);
-    }
-    // It has settled.
-    hair.remove::<Settling>();
-    #[cfg(feature = "render")]
-    {
-        if let Some(look) = made.look {
-            hair.insert(look);
-        }
-        if !made.followers.0.is_empty() {
-            hair.insert(made.followers);
-        }
-        if let Some(shells) = made.shells {
-            hair.insert(super::shade::Shading::Made(shells));
-        }
-    }
-    let hair = hair.id();
-    let strands =
-        made.strands.into_iter().map(move |(strand, bonds)| (StrandOf(hair), strand, bonds));
-    commands.spawn_batch(strands.collect::<Vec<_>>());
-    spawn_solids(commands, wearer, hair, made.solids);
-    #[cfg(feature = "save")]
-    if let Some(hairdo) = wear.hairdo.clone() {
-        commands.entity(hair).queue(hairdo.into_fitting_command());
-    }
-    // These override the hairdo's.
-    let mut own = commands.entity(hair);
-    if let Some(look) = wear.look.clone() {
-        own.insert(look);
-    }
-    if let Some(dye) = wear.dye.clone() {
-        own.insert(dye);
-    }
-    if let Some(style) = wear.style {
-        own.insert(style);
-    }
-    commands.queue(move |world: &mut World| PassedTypes::pass(world, wearer, hair));
-    hair
 }
 
 fn spawn_solids(commands: &mut Commands, wearer: Entity, hair: Entity, solids: Solids) {
@@ -629,12 +730,15 @@ pub(super) fn fit_again(
     };
     for (wearer, wear, mut wearing) in &mut wearers {
         let wearing = wearing.bypass_change_detection();
-        let Some(hair) = wearing.worn.filter(|_| matches!(wearing.stage, WearStage::Done)) else {
+        let is_done = matches!(wearing.stage, WearStage::Done);
+        let Some(first) = wearing.worn.first().filter(|_| is_done).map(|worn| worn.hair) else {
             (wearing.has_changed, wearing.refit) = default();
             continue;
         };
-        let Ok((worn, roots, members)) = hairs.get(hair) else { continue };
-        wearing.has_changed |= worn.parts.iter().any(has_changed);
+        let all = wearing.worn.iter().map(|worn| hairs.get(worn.hair));
+        let Ok(all) = all.collect::<Result<Vec<_>, _>>() else { continue };
+        let mut parts = all.iter().flat_map(|(worn, ..)| &worn.parts);
+        wearing.has_changed |= parts.any(has_changed);
         let ready = wearing.refit.as_mut().and_then(check_ready);
         let is_ready = ready.is_some();
         if let Some(Ok(mut solids)) = ready {
@@ -642,7 +746,7 @@ pub(super) fn fit_again(
                 commands.entity(collider).try_despawn();
             }
             solids.capsules.retain(|(joint, _)| joints.contains(*joint));
-            spawn_solids(&mut commands, wearer, hair, solids);
+            spawn_solids(&mut commands, wearer, first, solids);
         }
         if is_ready {
             wearing.refit = None;
@@ -659,12 +763,16 @@ pub(super) fn fit_again(
                 continue;
             }
         };
-        let lengths = strands.iter_many(members.collection()).map(Strand::length);
+        let members = all.iter().flat_map(|(.., members)| members.collection());
+        let lengths = strands.iter_many(members).map(Strand::length);
+        let rooted = all.iter().map(|(_, roots, _)| Rooted {
+            skin: roots.meshes().collect(),
+            roots: roots.roots.clone(),
+        });
         let order = RefitInput {
             wear: wear.clone(),
             target,
-            skin: roots.meshes().collect(),
-            roots: roots.roots.clone(),
+            hairs: rooted.collect(),
             longest: lengths.fold(0.0, f32::max),
         };
         wearing.has_changed = false;

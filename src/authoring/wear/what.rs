@@ -31,6 +31,9 @@ use core::time::Duration;
 /// commands.entity(character).insert(bob);
 /// // What an artist made for this character:
 /// commands.entity(character).insert(WearHair::new(groom));
+/// // A beard beside it, of another colour:
+/// let beard = HairBeside::new(HairPreset::Beard).dyed(HairDye::pink());
+/// commands.entity(character).insert(WearHair::new(HairPreset::Short).and(beard));
 /// // Bald again:
 /// commands.entity(character).remove::<WearHair>();
 /// # }
@@ -38,7 +41,8 @@ use core::time::Duration;
 ///
 /// The hair is a [`Hair`](crate::Hair) entity of its own, below the bone (or the mesh where there
 /// is none), with [`WornBy`](crate::WornBy), [`WornAs`] and [`WornPreset`](crate::WornPreset); [`HairWorn`] has its entity, and
-/// [`WornHair`](crate::WornHair) on the wearer. Unless it is styled it has settled then, as
+/// [`WornHair`](crate::WornHair) on the wearer. So is each that is worn [beside](Self::beside) it; all come at once, on one
+/// set of colliders. Unless it is styled it has settled then, as
 /// [`SettleSettings`](crate::SettleSettings) say, on the character as it is bound to its skeleton. Its settings are the preset's, and a
 /// [`HairWetting`](crate::HairWetting) with the number of fibres that grow there. Others are put on the wearer,
 /// before or after; all hair that it wears takes them over, this one and those to come:
@@ -56,8 +60,9 @@ use core::time::Duration;
 /// one is ready; another [`look`](Self::look), [`dye`](Self::dye) or [`style`](Self::style) is applied to the worn
 /// hair. Hair that grows from the same roots, as with another [`length`](Self::length), takes over how the old one lay
 /// and settles before the eyes: a slider shows each value that it is made for while it is dragged. The same hair for
-/// many alike is made once. What a game has put on the wearer stays; what it has put on the old hair itself goes with
-/// it, and so do water, treatments and ties.
+/// many alike is made once. Of hairs that are worn beside each other those that have not changed are kept. What a game
+/// has put on the wearer stays; what it has put on the old hair itself goes with it, and so do water, treatments and
+/// ties.
 /// Hair that cannot be worn is reported once, as a [`HairFault`](crate::HairFault) and by
 /// [`HairNotWorn`]; the wearer keeps the hair that it has.
 ///
@@ -73,6 +78,9 @@ use core::time::Duration;
 pub struct WearHair {
     /// What is worn.
     pub hair: HairSource,
+    /// What is worn beside it on the same head, such as a beard: see [`and`](Self::and). Their order means nothing; a
+    /// preset that is there twice is a [`WearError::Twice`]. Default none.
+    pub beside: Vec<HairBeside>,
     /// The name of the bone, or of the mesh, that it is worn on. Default `None`: the entity's own
     /// mesh, else the bone whose name ends with the word head (`Head`, `mixamorig:Head`,
     /// `J_Bip_C_Head`) or is Rigify's (`DEF-spine.006`), else the only mesh there is: on the joint
@@ -116,8 +124,8 @@ pub struct WearHair {
     /// Whether colliders are fitted to head and body: balls for the head, capsules or balls for the joints
     /// that hair reaches. [`HairCollider`](crate::HairCollider)s of the game's own replace those of the bone
     /// that they are on or below: one on a hand the hand's, one on the head, its jaw or its hat all of the
-    /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Each
-    /// worn hair brings its own, also a beard beside hair. Default `true`.
+    /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Hairs
+    /// beside each other share them; another `WearHair` brings its own. Default `true`.
     pub colliders: bool,
     /// When it is put on, by [`Time<Fixed>::elapsed`](Time::elapsed): before the tick that reaches this; the game
     /// waits for it there where it is not ready. So the same ticks move it on any machine, as lockstep, rollback and
@@ -144,6 +152,7 @@ impl Default for WearHair {
     fn default() -> Self {
         Self {
             hair: HairSource::default(),
+            beside: Vec::new(),
             on: None,
             mesh: None,
             hides_old_hair: false,
@@ -168,6 +177,17 @@ impl WearHair {
     /// Hair of a preset or a groom, on the head.
     pub fn new(hair: impl Into<HairSource>) -> Self {
         Self { hair: hair.into(), ..default() }
+    }
+
+    /// The same with another hair beside it: a preset, a groom, or a [`HairBeside`] with its own length and colour.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*;
+    /// let wear = WearHair::new(HairPreset::Undercut).and(HairPreset::Beard);
+    /// ```
+    pub fn and(mut self, hair: impl Into<HairBeside>) -> Self {
+        self.beside.push(hair.into());
+        self
     }
 
     /// The same on the bone or mesh of this name.
@@ -212,9 +232,74 @@ impl WearHair {
         self
     }
 
+    /// The same styled like this.
+    #[cfg(feature = "save")]
+    pub fn styled(mut self, hairdo: Hairdo) -> Self {
+        self.hairdo = Some(hairdo);
+        self
+    }
+
+    /// What each of its hairs is.
+    pub(super) fn sources(&self) -> impl Iterator<Item = &HairSource> {
+        core::iter::once(&self.hair).chain(self.beside.iter().map(|other| &other.hair))
+    }
+
+    /// Each of its hairs, as if it was worn alone.
+    pub(super) fn each(&self) -> impl Iterator<Item = Self> + use<> {
+        let first = Self { beside: Vec::new(), ..self.clone() };
+        let alone = |other: &HairBeside| {
+            let other = other.clone();
+            Self {
+                hair: other.hair,
+                seed: other.seed,
+                length: other.length,
+                look: other.look,
+                dye: other.dye,
+                style: other.style,
+                hairline: other.hairline,
+                place: other.place,
+                #[cfg(feature = "save")]
+                hairdo: other.hairdo,
+                ..first.clone()
+            }
+        };
+        let others: Vec<_> = self.beside.iter().map(alone).collect();
+        core::iter::once(first).chain(others)
+    }
+
+    /// The one of which these are [`each`](Self::each).
+    pub(super) fn of_each(mut all: impl Iterator<Item = Self>) -> Option<Self> {
+        let first = all.next()?;
+        Some(Self { beside: all.map(HairBeside::from).collect(), ..first })
+    }
+
+    /// # Errors
+    /// [`WearError::Twice`] where two would grow from the same roots.
+    pub(super) fn check_beside(&self) -> Result<(), WearError> {
+        let all: Vec<_> = self.each().collect();
+        let is_same = |a: &Self, b: &Self| match (&a.hair, &b.hair) {
+            (HairSource::Preset(a), HairSource::Preset(b)) => a == b,
+            (HairSource::Groom { groom: of, .. }, HairSource::Groom { groom, .. }) => {
+                of == groom && a.place == b.place
+            }
+            _ => false,
+        };
+        let twice = (1..all.len()).find(|&i| all[..i].iter().any(|other| is_same(other, &all[i])));
+        let Some(i) = twice else { return Ok(()) };
+        let hair = match &all[i].hair {
+            HairSource::Preset(preset) => format!("the preset {preset:?}"),
+            HairSource::Groom { groom, .. } => groom
+                .path()
+                .map_or_else(|| "a groom".to_owned(), |path| format!("the groom {path}")),
+        };
+        Err(WearError::Twice { hair })
+    }
+
     /// Without what worn hair can take, and its time.
     pub(super) fn bare(&self) -> Self {
-        Self { look: None, dye: None, style: None, at: None, ..self.clone() }
+        let each = self.each();
+        let bare = each.map(|hair| Self { look: None, dye: None, style: None, at: None, ..hair });
+        Self::of_each(bare).unwrap_or_default()
     }
 
     /// Whether they differ only in what worn hair can take.
@@ -222,28 +307,28 @@ impl WearHair {
         self.bare() == other.bare()
     }
 
-    /// Whether they are the same preset, or grooms, on the same head, perhaps of another length, seed or hairline.
+    /// Whether they are the same presets, or grooms, on the same head, perhaps of another length, seed or hairline.
     pub(super) fn is_variation(&self, other: &Self) -> bool {
         let kind = |wear: &Self| {
-            let mut kind = Self { length: 1.0, seed: 0, hairline: None, ..wear.bare() };
-            if let HairSource::Groom { groom, guides } = &mut kind.hair {
-                (*groom, *guides) = default();
-            }
-            kind
+            let each = wear.bare().each().map(|mut hair| {
+                if let HairSource::Groom { groom, guides } = &mut hair.hair {
+                    (*groom, *guides) = default();
+                }
+                Self { length: 1.0, seed: 0, hairline: None, ..hair }
+            });
+            each.collect::<Vec<_>>()
         };
         kind(self) == kind(other)
     }
 
-    /// This hair with the look, dye and style of another.
+    /// This hair with the look, dye and style of another of as many.
     pub(super) fn looking_like(self, other: &Self) -> Self {
-        Self { look: other.look.clone(), dye: other.dye.clone(), style: other.style, ..self }
-    }
-
-    /// The same styled like this.
-    #[cfg(feature = "save")]
-    pub fn styled(mut self, hairdo: Hairdo) -> Self {
-        self.hairdo = Some(hairdo);
-        self
+        let pairs = self.each().zip(other.each());
+        let each = pairs.map(|(own, other)| {
+            let Self { look, dye, style, .. } = other;
+            Self { look, dye, style, ..own }
+        });
+        Self::of_each(each).unwrap_or(self)
     }
 }
 
@@ -260,6 +345,110 @@ impl TryFrom<Hairdo> for WearHair {
         let preset = of.preset().ok_or(HairdoError::NoPreset)?;
         let (seed, length) = (of.seed, of.length);
         Ok(Self { seed, length, ..Self::new(preset) }.styled(hairdo))
+    }
+}
+
+/// A hair that is worn beside another by one [`WearHair`], such as a beard: with its own length, colour and style, on
+/// the same head and colliders.
+///
+/// ```
+/// # use bevy_keratin::prelude::*;
+/// let stubble = HairBeside::new(HairPreset::Beard).long(0.5);
+/// let wear = WearHair::new(HairPreset::Short).and(stubble);
+/// ```
+#[derive(Reflect, Clone, Debug, PartialEq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct HairBeside {
+    /// As [`WearHair::hair`].
+    pub hair: HairSource,
+    /// As [`WearHair::seed`].
+    pub seed: u64,
+    /// As [`WearHair::length`].
+    pub length: f32,
+    /// As [`WearHair::look`].
+    pub look: Option<HairLook>,
+    /// As [`WearHair::dye`].
+    pub dye: Option<HairDye>,
+    /// As [`WearHair::style`].
+    pub style: Option<HairStyle>,
+    /// As [`WearHair::hairline`].
+    pub hairline: Option<Hairline>,
+    /// As [`WearHair::place`].
+    pub place: Transform,
+    /// As [`WearHair::hairdo`].
+    #[cfg(feature = "save")]
+    pub hairdo: Option<Hairdo>,
+}
+
+impl Default for HairBeside {
+    fn default() -> Self {
+        WearHair::default().into()
+    }
+}
+
+/// What a wear says of its first hair.
+impl From<WearHair> for HairBeside {
+    fn from(wear: WearHair) -> Self {
+        Self {
+            hair: wear.hair,
+            seed: wear.seed,
+            length: wear.length,
+            look: wear.look,
+            dye: wear.dye,
+            style: wear.style,
+            hairline: wear.hairline,
+            place: wear.place,
+            #[cfg(feature = "save")]
+            hairdo: wear.hairdo,
+        }
+    }
+}
+
+impl From<HairPreset> for HairBeside {
+    fn from(preset: HairPreset) -> Self {
+        Self::new(preset)
+    }
+}
+
+impl From<Handle<Groom>> for HairBeside {
+    fn from(groom: Handle<Groom>) -> Self {
+        Self::new(groom)
+    }
+}
+
+/// As [`WearHair::try_from`].
+#[cfg(feature = "save")]
+impl TryFrom<Hairdo> for HairBeside {
+    type Error = HairdoError;
+
+    fn try_from(hairdo: Hairdo) -> Result<Self, HairdoError> {
+        WearHair::try_from(hairdo).map(Self::from)
+    }
+}
+
+impl HairBeside {
+    /// Hair of a preset or a groom.
+    pub fn new(hair: impl Into<HairSource>) -> Self {
+        WearHair::new(hair).into()
+    }
+
+    /// The same with a length of `times` the preset's.
+    pub fn long(mut self, times: f32) -> Self {
+        self.length = times;
+        self
+    }
+
+    /// The same bleached and dyed.
+    pub fn dyed(mut self, dye: HairDye) -> Self {
+        self.dye = Some(dye);
+        self
+    }
+
+    /// The same styled like this.
+    #[cfg(feature = "save")]
+    pub fn styled(mut self, hairdo: Hairdo) -> Self {
+        self.hairdo = Some(hairdo);
+        self
     }
 }
 
@@ -327,8 +516,10 @@ fn tell_if_nothing_wears(mut world: DeferredWorld, context: HookContext) {
 #[derive(Component, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Component, Clone, PartialEq)]
 pub struct WornAs {
-    /// The component that it was made from.
+    /// The component that it was made from; of several hairs, as if this one was worn alone.
     pub wear: WearHair,
+    /// Which of the hairs of that component it is.
+    pub(super) which: usize,
     /// The meshes that its colliders were fitted to.
     #[entities]
     pub(super) parts: Vec<Entity>,
@@ -344,14 +535,17 @@ impl WornAs {
     }
 }
 
-/// Triggered on an entity with [`WearHair`] once its hair is spawned, at first and after each change.
-#[derive(EntityEvent, Reflect, Clone, Copy, Debug, PartialEq)]
+/// Triggered on an entity with [`WearHair`] once its hair is spawned, at first and after each change: once for all hairs
+/// of the component.
+#[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
 pub struct HairWorn {
     /// The wearer.
     pub entity: Entity,
     /// The hair.
     pub hair: Entity,
+    /// Those beside it, in the order of [`WearHair::beside`].
+    pub beside: Vec<Entity>,
     /// The mesh that it grows on, that with most of the head where there are several:
     /// [`RootsOnMesh`](crate::authoring::attach::RootsOnMesh) names all.
     pub mesh: Entity,

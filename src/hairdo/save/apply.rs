@@ -61,8 +61,8 @@ impl Hairdo {
         Self { strands, cuticle, look, dye, preset, ties, followers }.checked()
     }
 
-    /// Puts the hairdo on a hair of the same groom, or on the one that an entity wears, at rest: all strands, or in case of an error
-    /// none.
+    /// Puts the hairdo on a hair of the same groom, or on the one that an entity wears, of several on that of the hairdo's
+    /// preset, at rest: all strands, or in case of an error none.
     ///
     /// Strands are cut as they are in the hairdo, or grow back to that. Roots stay where they are; a strand whose root has moved since, as on a skinned mesh, is
     /// moved with it. Acting treatments end, winding on a rod starts again. Ties of the hairdo come as children of the
@@ -73,9 +73,10 @@ impl Hairdo {
     /// In a system use [`Hairdo::apply`], or [`ApplyHairdo`](super::ApplyHairdo) to get an answer.
     ///
     /// # Errors
-    /// When `hair` is no hair and wears none, or several, or its strands do not match the hairdo's.
+    /// When `hair` is no hair and wears none, or several of which none alone has the hairdo's preset, or its strands do not
+    /// match the hairdo's.
     pub fn apply(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
-        let hair = the_hair(world, hair)?;
+        let hair = self.its_hair(world, hair)?;
         return_to_cpu(world, hair);
         let mut members = members(world, hair);
         members.retain(|member| world.get::<Strand>(*member).is_some());
@@ -119,6 +120,20 @@ impl Hairdo {
             hair.remove::<HairDye>();
         }
         Ok(())
+    }
+
+    /// The one hair that an entity is or wears; of several the one of the same preset.
+    pub(super) fn its_hair(&self, world: &World, entity: Entity) -> Result<Entity, HairdoError> {
+        the_hair(world, entity).or_else(|none_or_several| {
+            let preset = |hair: &Entity| world.get::<WornPreset>(*hair).map(|worn| &worn.name);
+            let own = self.preset.as_ref().map(|own| &own.name);
+            let mut same = hairs_of(world, entity);
+            same.retain(|hair| own.is_some() && preset(hair) == own);
+            match same[..] {
+                [hair] => Ok(hair),
+                _ => Err(none_or_several),
+            }
+        })
     }
 
     /// [`Hairdo::apply`] as an entity command. Errors are reported as a [`HairFault`].
@@ -177,7 +192,7 @@ pub(super) fn report(world: &mut World, hair: Entity, wrong: HairdoError) {
 }
 
 /// The one hair that an entity is or wears.
-pub(super) fn the_hair(world: &World, entity: Entity) -> Result<Entity, HairdoError> {
+fn the_hair(world: &World, entity: Entity) -> Result<Entity, HairdoError> {
     let hairs = hairs_of(world, entity);
     match hairs[..] {
         [hair] => Ok(hair),

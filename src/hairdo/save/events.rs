@@ -1,15 +1,13 @@
 //! Hairdos for systems: requests and answers by events.
 
-use super::{
-    Hairdo, HairdoError,
-    apply::{report, the_hair},
-};
+use super::{Hairdo, HairdoError, apply::report};
 #[cfg(feature = "gpu")]
 use crate::hair::strand::{AskForStrands, StrandsArrived, is_on_gpu};
+use crate::hair::worn::hairs_of;
 use bevy::prelude::*;
 
-/// Requests the hairdo of a [`Hair`](crate::Hair), or of the one that the entity wears. Answered by
-/// [`HairdoCaptured`] on the same entity, or by [`HairdoRejected`].
+/// Requests the hairdo of a [`Hair`](crate::Hair), or those of all that the entity wears, such as hair and beard.
+/// Answered by [`HairdoCaptured`] on the same entity, once for each hair, or by [`HairdoRejected`].
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
@@ -42,12 +40,14 @@ pub struct CaptureHairdo {
 pub struct HairdoCaptured {
     /// The hair, or its wearer.
     pub entity: Entity,
+    /// The hair.
+    pub hair: Entity,
     /// Its hairdo at the moment of the request; of hair on the GPU a few frames later.
     pub hairdo: Hairdo,
 }
 
-/// Requests that a hairdo is put on a [`Hair`](crate::Hair), or on the one that the entity wears, strand by strand where it has as many
-/// strands and nodes ([`Hairdo::apply`]), else resampled ([`Hairdo::apply_resampled`]). Answered by
+/// Requests that a hairdo is put on a [`Hair`](crate::Hair), or on the one that the entity wears, of several on that of
+/// the hairdo's preset, strand by strand where it has as many strands and nodes ([`Hairdo::apply`]), else resampled ([`Hairdo::apply_resampled`]). Answered by
 /// [`HairdoApplied`] on the same entity, or by [`HairdoRejected`].
 #[derive(EntityEvent, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Clone, PartialEq)]
@@ -79,22 +79,28 @@ pub struct HairdoRejected {
 
 pub(super) fn take(request: On<CaptureHairdo>, mut commands: Commands) {
     let asked = request.entity;
-    commands.queue(move |world: &mut World| match the_hair(world, asked) {
-        #[cfg(feature = "gpu")]
-        Ok(hair) if is_on_gpu(world, hair) => {
-            let mut awaited = world.entity_mut(hair);
-            awaited.entry::<Awaited>().or_default().get_mut().0.push(asked);
-            world.trigger(AskForStrands { entity: hair });
+    commands.queue(move |world: &mut World| {
+        let hairs = hairs_of(world, asked);
+        if hairs.is_empty() {
+            refuse(world, asked, HairdoError::NoHair { entity: asked });
         }
-        Ok(hair) => answer(world, hair, asked),
-        Err(error) => refuse(world, asked, error),
+        for hair in hairs {
+            #[cfg(feature = "gpu")]
+            if is_on_gpu(world, hair) {
+                let mut awaited = world.entity_mut(hair);
+                awaited.entry::<Awaited>().or_default().get_mut().0.push(asked);
+                world.trigger(AskForStrands { entity: hair });
+                continue;
+            }
+            answer(world, hair, asked);
+        }
     });
 }
 
 /// Tells the one that was asked the hairdo of a hair.
 fn answer(world: &mut World, hair: Entity, asked: Entity) {
     match Hairdo::of_strands(world, hair) {
-        Ok(hairdo) => world.trigger(HairdoCaptured { entity: asked, hairdo }),
+        Ok(hairdo) => world.trigger(HairdoCaptured { entity: asked, hair, hairdo }),
         Err(error) => refuse(world, asked, error),
     }
 }

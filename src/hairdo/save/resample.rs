@@ -1,6 +1,6 @@
 //! Resampling a hairdo for another groom.
 
-use super::{Hairdo, HairdoError, StyledStrand, apply::the_hair};
+use super::{Hairdo, HairdoError, StyledStrand};
 use crate::{
     base::grid::KdTree,
     hair::strand::return_to_cpu,
@@ -34,7 +34,7 @@ impl Hairdo {
     /// # Errors
     /// When `hair` is no hair or has invalid numbers, or this hairdo has no strands.
     pub fn apply_resampled(&self, world: &mut World, hair: Entity) -> Result<(), HairdoError> {
-        let hair = the_hair(world, hair)?;
+        let hair = self.its_hair(world, hair)?;
         return_to_cpu(world, hair);
         self.resampled_for(&Self::of(world, hair)?)?.apply(world, hair)
     }
