@@ -177,6 +177,67 @@ fn a_crowd_is_planted_once() {
     assert!(core::iter::repeat_with(is_shared).take(4).any(|shared| shared));
 }
 
+/// How long frames take (ms) in which so many join at once, beside a hair that sleeps: the longest before, and each frame
+/// from then on with how many of them wear theirs. The pools for other work stay as they are.
+fn joining(count: usize, seeds: u64, paused: bool) -> (f32, Vec<(f32, usize)>) {
+    let mut app = app();
+    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(ball(0.1));
+    let is = |i: usize, seed: u64| {
+        let at = Transform::from_xyz(0.5 * i as f32, 0.0, 0.0);
+        let wear = WearHair { seed, ..WearHair::new(HairPreset::Short) };
+        (Mesh3d(mesh.clone()), at, wear)
+    };
+    app.world_mut().spawn(is(0, 0));
+    let first = worn(&mut app);
+    wait_for(&mut app, |app| {
+        let counts = app.world().get::<bevy_keratin::SleepCounts>(first)?;
+        (counts.awake == 0).then_some(())
+    });
+    if paused {
+        app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    }
+    let frame = |app: &mut App| {
+        let start = Instant::now();
+        app.update();
+        let took = start.elapsed();
+        std::thread::sleep(Duration::from_secs_f32(1.0 / 60.0).saturating_sub(took));
+        1e3 * took.as_secs_f32()
+    };
+    let before = (0..60).map(|_| frame(&mut app)).fold(0.0, f32::max);
+    let crowd: Vec<Entity> =
+        (1..=count).map(|i| app.world_mut().spawn(is(i, i as u64 % seeds)).id()).collect();
+    let (start, mut frames) = (Instant::now(), Vec::new());
+    loop {
+        let took = frame(&mut app);
+        let there = crowd.iter().filter(|root| app.world().get::<WornHair>(**root).is_some()).count();
+        frames.push((took, there));
+        if there == count {
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(300), "{there} of {count}");
+    }
+    frames.extend((0..60).map(|_| (frame(&mut app), count)));
+    (before, frames)
+}
+
+/// A measurement, which all else on the machine disturbs.
+#[test]
+#[ignore = "measures time"]
+fn two_hundred_who_join_hold_no_frame_up() {
+    for (seeds, paused) in [(1, true), (40, true), (1, false)] {
+        let (before, frames) = joining(200, seeds, paused);
+        let mut long: Vec<_> = frames.iter().enumerate().map(|(i, (ms, n))| (*ms, i, *n)).collect();
+        long.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let dressed = frames.iter().position(|(_, there)| *there == 200).unwrap();
+        let median = long[long.len() / 2].0;
+        println!(
+            "{seeds} seeds, paused {paused}: {dressed} frames until all wear it, median {median} ms, before {before}; \
+             longest (ms, frame, worn by): {:?}",
+            &long[..6]
+        );
+    }
+}
+
 /// Where nodes are after 60 ticks, with so many in a frame, in frames that take so long.
 fn worn_at_a_tick(together: u32, frame: Duration) -> Vec<Vec3> {
     let mut app = app();

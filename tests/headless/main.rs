@@ -72,6 +72,7 @@ mod golden;
 mod groom;
 mod hairdo;
 mod held;
+mod hour;
 mod lod;
 mod morph;
 mod pairs;

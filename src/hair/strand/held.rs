@@ -12,8 +12,8 @@ use bevy::{math::Isometry3d, prelude::*};
 /// would be stretched or crushed by more than 4 % (with [`Sweeps`](crate::SolverMethod::Sweeps) 5 %, of springs 50 %) they
 /// give way. A target out of reach is reported once as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
 /// Hair on the graphics card gives way to its own length only, not to colliders.
-#[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Component, Default, Clone)]
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
 #[require(HeldNodesState)]
 pub struct HeldNodes {
     /// For each node from the root its target at the end of the next substep (m, in the hair's
