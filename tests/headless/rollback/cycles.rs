@@ -211,7 +211,10 @@ fn play(world: &mut World) {
                 for strand in &past.strands[..STRANDS / 2] {
                     let mut strand = world.entity_mut(*strand);
                     if wound && !strand.contains::<WoundOn>() {
-                        strand.insert((PermWinding { seconds: 0.8, ..default() }, WoundOn(rod)));
+                        strand.insert((
+                            PermWinding { seconds: 0.8, from_node: 4, ..default() },
+                            WoundOn(rod),
+                        ));
                     } else if !wound {
                         strand.remove::<WoundOn>();
                     }
@@ -230,7 +233,7 @@ fn play(world: &mut World) {
                         world.entity_mut(*strand).remove::<Tied>();
                     }),
                     170..200 => {
-                        let aside = Vec3::new(0.3, 0.05, 0.01 * (t % 240.0 - 170.0));
+                        let aside = Vec3::new(0.1, 0.12, 0.002 * (t % 240.0 - 170.0));
                         let mut targets = vec![None; 8];
                         targets[7] = Some(aside);
                         let held = HeldNodes { targets, ..default() };
