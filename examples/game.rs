@@ -67,15 +67,15 @@ fn ground(at: Vec3) -> f32 {
 
 fn world(mut commands: Commands, assets: Res<AssetServer>) {
     let plain = |color: Color| MeshMaterial3d(assets.add(StandardMaterial::from(color)));
-    let grass = plain(Color::srgb(0.3, 0.38, 0.22));
-    let stone = plain(Color::srgb(0.4, 0.38, 0.36));
-    let water = plain(Color::srgb(0.15, 0.28, 0.36));
-    commands.spawn((Mesh3d(assets.add(Plane3d::default().mesh().size(60.0, 60.0).build())), grass));
+    commands.spawn((
+        Mesh3d(assets.add(Plane3d::default().mesh().size(60.0, 60.0).build())),
+        plain(Color::srgb(0.3, 0.38, 0.22)),
+    ));
     commands.spawn((HairCollider::plane(Dir3::Y), Transform::from_xyz(0.0, -1.4, 0.0)));
     let lying = Quat::from_rotation_x(-core::f32::consts::FRAC_PI_2);
     commands.spawn((
         Mesh3d(assets.add(Circle::new(3.0).mesh().build())),
-        water,
+        plain(Color::srgb(0.15, 0.28, 0.36)),
         Transform::from_translation(LAKE + Vec3::Y * 0.01).with_rotation(lying),
     ));
     if let Ok(lake) = WaterVolume::pool(Vec3::new(3.0, 0.7, 3.0)) {
@@ -85,7 +85,7 @@ fn world(mut commands: Commands, assets: Res<AssetServer>) {
         WindZone::fire(),
         Transform::from_translation(FIRE),
         Mesh3d(assets.add(Cone::new(0.3, 0.4).mesh().build())),
-        stone,
+        plain(Color::srgb(0.4, 0.38, 0.36)),
         PointLight { color: Color::srgb(1.0, 0.6, 0.3), intensity: 200_000.0, ..default() },
     ));
     commands.insert_resource(HairWind { velocity: Vec3::X * 1.5, ..default() });

@@ -37,7 +37,8 @@ pub fn app_with_meshes(fps: f64) -> App {
     app
 }
 
-fn ready(app: &mut App) {
+/// An app of the test's own, whose faults are kept.
+pub fn ready(app: &mut App) {
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.init_resource::<Reported>().add_systems(Last, listen);
     app.finish();

@@ -146,35 +146,110 @@ fn stepping_through_presets_leaks_nothing() {
 fn a_crowd_is_planted_once() {
     let mut app = app();
     let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(ball(0.1));
-    let mut dress = |many: usize| {
-        let start = Instant::now();
-        let crowd: Vec<Entity> = (0..many)
-            .map(|i| {
-                let at = Transform::from_xyz(i as f32, 0.0, 0.0)
-                    .with_rotation(Quat::from_rotation_y(0.3 * i as f32));
-                let is = (Mesh3d(mesh.clone()), at, WearHair::new(HairPreset::Short));
-                app.world_mut().spawn(is).id()
-            })
-            .collect();
-        let hair = wait_for(&mut app, |app| {
-            let all = crowd.iter().map(|root| drawn(app, *root).first().copied());
-            all.collect::<Option<Vec<_>>>()
-        });
-        let seconds = start.elapsed().as_secs_f32();
-        let first = strands(&mut app, hair[0]).len();
-        hair.iter().for_each(|hair| assert_eq!(strands(&mut app, *hair).len(), first));
-        crowd.into_iter().for_each(|root| assert!(app.world_mut().despawn(root)));
+    let crowd: Vec<Entity> = (0..20)
+        .map(|i| {
+            let at = Transform::from_xyz(i as f32, 0.0, 0.0)
+                .with_rotation(Quat::from_rotation_y(0.3 * i as f32));
+            let is = (Mesh3d(mesh.clone()), at, WearHair::new(HairPreset::Short));
+            app.world_mut().spawn(is).id()
+        })
+        .collect();
+    // In how many frames they come, from the first on.
+    let mut frames = 0;
+    let hair = wait_for(&mut app, |app| {
+        let all = crowd.iter().map(|root| drawn(app, *root).first().copied());
+        let there: Vec<Entity> = all.flatten().collect();
+        frames += usize::from(!there.is_empty());
+        (there.len() == crowd.len()).then_some(there)
+    });
+    let first = strands(&mut app, hair[0]).len();
+    hair.iter().for_each(|hair| assert_eq!(strands(&mut app, *hair).len(), first));
+    // What is made once is there for all of them at once: as many are put on in a frame as have 800 strands. Made one by
+    // one they come frames apart.
+    let at_once = crowd.len().div_ceil(800usize.div_ceil(first));
+    assert!(frames <= at_once, "they came in {frames} frames, not {at_once}");
+}
+
+/// How long this thread and those that help it with frames have been at work (s), where the system tells: other work does
+/// not count, on the pools for that or elsewhere on the machine.
+fn at_work() -> Option<f64> {
+    let threads = std::fs::read_dir("/proc/self/task").ok()?;
+    let (own, read) =
+        (std::fs::read_to_string("/proc/thread-self/comm").ok()?, std::fs::read_to_string);
+    let busy = threads.flatten().filter_map(|thread| {
+        let name = read(thread.path().join("comm")).ok()?;
+        let is_frame = name == own || name.starts_with("Compute");
+        let time = read(thread.path().join("schedstat")).ok().filter(|_| is_frame)?;
+        time.split(' ').next()?.parse::<f64>().ok()
+    });
+    Some(1e-9 * busy.sum::<f64>())
+}
+
+/// How long frames take (ms) in which so many join at once, beside a hair that sleeps: the longest before, and each frame
+/// from then on with how many of them wear theirs. The pools for other work stay as they are.
+fn joining(count: usize, seeds: u64, is_paused: bool) -> (f32, Vec<(f32, usize)>) {
+    let mut app = app();
+    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(ball(0.1));
+    let is = |i: usize, seed: u64| {
+        let at = Transform::from_xyz(0.5 * i as f32, 0.0, 0.0);
+        let wear = WearHair { seed, ..WearHair::new(HairPreset::Short) };
+        (Mesh3d(mesh.clone()), at, wear)
+    };
+    app.world_mut().spawn(is(0, 0));
+    let first = worn(&mut app);
+    wait_for(&mut app, |app| {
+        let counts = app.world().get::<bevy_keratin::SleepCounts>(first)?;
+        (counts.awake == 0).then_some(())
+    });
+    if is_paused {
+        app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    }
+    // Those who join are passers-by.
+    app.add_observer(|hair: On<HairWorn>, mut commands: Commands| {
+        commands.entity(hair.hair).insert((HairLod::default(), HairScreenShare(0.02)));
+    });
+    let frame = |app: &mut App| {
+        let (start, work) = (Instant::now(), at_work());
         app.update();
-        seconds
+        let took = start.elapsed();
+        let work = at_work().zip(work).map_or(took.as_secs_f64(), |(after, before)| after - before);
+        std::thread::sleep(Duration::from_secs_f32(1.0 / 60.0).saturating_sub(took));
+        1e3 * work as f32
     };
-    dress(1);
-    // Planted one by one they take ten times as long as one and more; other tests disturb a measurement.
-    let is_shared = || {
-        let (one, many) = (dress(1), dress(20));
-        println!("one is dressed in {one} s, twenty in {many} s");
-        many < 5.0 * one
-    };
-    assert!(core::iter::repeat_with(is_shared).take(4).any(|shared| shared));
+    let before = (0..60).map(|_| frame(&mut app)).fold(0.0, f32::max);
+    let crowd: Vec<Entity> =
+        (1..=count).map(|i| app.world_mut().spawn(is(i, i as u64 % seeds)).id()).collect();
+    let (start, mut frames) = (Instant::now(), Vec::new());
+    loop {
+        let took = frame(&mut app);
+        let there =
+            crowd.iter().filter(|root| app.world().get::<WornHair>(**root).is_some()).count();
+        frames.push((took, there));
+        if there == count {
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(300), "{there} of {count}");
+    }
+    frames.extend((0..60).map(|_| (frame(&mut app), count)));
+    (before, frames)
+}
+
+/// A measurement, which all else on the machine disturbs.
+#[test]
+#[ignore = "measures time"]
+fn two_hundred_who_join_hold_no_frame_up() {
+    for (seeds, is_paused) in [(1, true), (40, true), (1, false)] {
+        let (before, frames) = joining(200, seeds, is_paused);
+        let mut long: Vec<_> = frames.iter().enumerate().map(|(i, (ms, n))| (*ms, i, *n)).collect();
+        long.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let dressed = frames.iter().position(|(_, there)| *there == 200).unwrap();
+        let median = long[long.len() / 2].0;
+        println!(
+            "{seeds} seeds, paused {is_paused}: {dressed} frames until all wear it, median {median} ms, before {before}; \
+             longest (ms, frame, worn by): {:?}",
+            &long[..6]
+        );
+    }
 }
 
 /// Where nodes are after 60 ticks, with so many in a frame, in frames that take so long.

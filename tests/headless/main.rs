@@ -74,6 +74,7 @@ mod groom;
 mod hairdo;
 mod hat;
 mod held;
+mod hour;
 mod lod;
 mod morph;
 mod pairs;

@@ -24,6 +24,11 @@ pub(super) struct Reported {
 
 pub(super) fn app() -> App {
     let mut app = app_with_meshes(60.0);
+    listen(&mut app);
+    app
+}
+
+pub(super) fn listen(app: &mut App) {
     app.init_resource::<Reported>()
         .add_observer(|worn: On<HairWorn>, mut reported: ResMut<Reported>| {
             reported.worn.push(worn.event().clone());
@@ -31,7 +36,6 @@ pub(super) fn app() -> App {
         .add_observer(|not: On<HairNotWorn>, mut reported: ResMut<Reported>| {
             reported.refused.push((not.entity, not.error.clone()));
         });
-    app
 }
 
 fn reported(app: &mut App) -> Reported {

@@ -369,7 +369,7 @@ fn no_file_is_too_long_to_be_understood() {
 /// the substeps of dry hair, 45,900 before hair could be rolled back and cut, and worn hair settled off the main thread, was
 /// made once for a crowd and changed under a slider or at a tick of the game's choice.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 49_100;
+const MOST_LINES: usize = 49_400;
 
 #[test]
 fn the_crate_stays_small() {

@@ -12,8 +12,8 @@ use bevy::{math::Isometry3d, prelude::*};
 /// would be stretched or crushed by more than 4 % (with [`Sweeps`](crate::SolverMethod::Sweeps) 5 %, of springs 50 %) they
 /// give way. A target out of reach is reported once as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
 /// Hair on the graphics card gives way to its own length only, not to colliders.
-#[derive(Component, Reflect, Clone, Debug, Default)]
-#[reflect(Component, Default, Clone)]
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
 #[require(HeldNodesState)]
 pub struct HeldNodes {
     /// For each node from the root its target at the end of the next substep (m, in the hair's
@@ -46,7 +46,7 @@ pub struct HeldNodesState {
 
 impl HeldNodesState {
     pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
-        tape.flags([&mut self.out_of_reach]);
+        tape.flags([&mut self.out_of_reach, &mut self.is_led]);
         tape.option(&mut self.pace, Tape::value);
         tape.value(&mut self.refused);
         tape.value(&mut self.in_a_row);
@@ -203,57 +203,58 @@ impl<'a> Held<'a> {
         self.state.pace == Some(0.0)
     }
 
-    /// Whether a substep that brings nodes to a `place` is taken, which strains no edge before the last held node by
-    /// more than `most_strain`; else the strand is to give way. Sets the pace of the next one.
+    /// Takes a substep that brings nodes to a `place` and strains no edge by more than `most_strain`, not those beyond the
+    /// last held node either, which colliders may keep from following. Else the strand is to
+    /// [give way](Strand::give_way), with the nodes up to that of the error at rest. Sets the pace of the next one.
     pub(crate) fn accepts(
         &mut self,
         strand: &Strand,
         most_strain: f32,
         place: impl Fn(usize) -> Vec3,
-    ) -> bool {
+    ) -> Result<(), usize> {
         let mut before = place(0);
-        let fits = |(l, node): (&f32, usize)| {
-            let p = place(node);
-            let length = core::mem::replace(&mut before, p).distance(p);
-            (length - l).abs() <= most_strain * l
+        let is_strained = |(l, node): &(&f32, usize)| {
+            let p = place(*node);
+            let off = (core::mem::replace(&mut before, p).distance(p) - *l).abs();
+            off.is_nan() || off > most_strain * *l
         };
-        let mut held = strand.rest_lengths.iter().zip(1..=self.nodes.last(strand));
         let is_let_go = self.is_let_go();
         let state = &mut *self.state;
         if is_let_go {
             (state.pace, state.in_a_row) = (Some(SLOWEST), 0);
-            return true;
+            return Ok(());
         }
-        if held.all(fits) {
+        let Some((_, strained)) = strand.rest_lengths.iter().zip(1..).find(is_strained) else {
             state.in_a_row = 0;
             state.pace = state.pace.filter(|pace| *pace < self.nodes.farthest(strand));
             match &mut state.pace {
                 Some(pace) => *pace *= FASTER,
                 None => state.refused = 0,
             }
-            return true;
-        }
+            return Ok(());
+        };
         let tried = state.pace.unwrap_or(f32::INFINITY).min(self.nodes.farthest(strand));
         state.in_a_row = if tried > SLOWEST { 0 } else { state.in_a_row + 1 };
         let is_stuck = state.in_a_row >= STUCK;
         state.pace = Some(if is_stuck { 0.0 } else { (tried * SLOWER).max(SLOWEST) });
         state.refused = state.refused.saturating_add(1);
-        false
+        let last = self.nodes.last(strand);
+        Err(if strained > last { strand.edges() } else { last })
     }
 }
 
 impl Strand {
     /// Does not take a substep of `dt` (s), in which points at rest in the world have moved by `frame_delta`: nodes stay
-    /// where they were on the head, as far as their edges' lengths let them when the root has moved; those up to the last
-    /// held one at rest.
+    /// where they were on the head, as far as their edges' lengths let them when the root has moved; those up to `last` at
+    /// rest.
     pub(crate) fn give_way(
         &mut self,
-        held: &HeldNodes,
+        last: usize,
         most_strain: f32,
         frame_delta: Isometry3d,
         dt: f32,
     ) {
-        let (last, back) = (held.last(self), frame_delta.inverse());
+        let back = frame_delta.inverse();
         for edge in 0..self.edges() {
             let (start, shifted) = (self.positions[edge], self.positions[edge + 1]);
             let mut end = back * shifted;
@@ -271,6 +272,32 @@ impl Strand {
         self.tensions[..last].fill(0.0);
         self.angular_velocities[..last].fill(Vec3::ZERO);
         self.step_succeeded();
+    }
+
+    /// After a substep of `dt` (s) in which points at rest in the world have moved by `frame_delta`: if what jams the strand
+    /// strains an edge by more than this, such edges come to their lengths, with what hangs on them, and nodes to rest.
+    pub(crate) fn come_to_length(&mut self, most_strain: f32, frame_delta: Isometry3d, dt: f32) {
+        if self.peak_strain() <= most_strain {
+            return;
+        }
+        let mut shift = Vec3::ZERO;
+        for edge in 0..self.edges() {
+            let (start, l) = (self.positions[edge], self.rest_lengths[edge]);
+            let free = self.positions[edge + 1] + shift;
+            let along = free - start;
+            if (along.length() - l).abs() > most_strain * l {
+                let end = start + along.normalize_or(self.root_frame * Vec3::Z) * l;
+                shift += end - free;
+                self.positions[edge + 1] = end;
+            } else {
+                self.positions[edge + 1] = free;
+            }
+        }
+        for (v, p) in self.velocities.iter_mut().zip(&self.positions) {
+            *v = (*p - frame_delta * *p) / dt;
+        }
+        self.tensions.fill(0.0);
+        self.angular_velocities.fill(Vec3::ZERO);
     }
 }
 

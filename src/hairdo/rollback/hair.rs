@@ -149,14 +149,14 @@ impl<'a> StrandParts<'a> {
         part(tape, self.moisture, Moisture::record);
         part(tape, self.air, BlownAir::record);
         part(tape, self.received, |received, tape| tape.list(&mut received.total));
-        part(tape, self.held, HeldNodes::record);
-        part(tape, self.holding, HeldNodesState::record);
-        part(tape, self.winding, WindingProgress::record);
-        part(tape, self.tie, TieProgress::record);
+        remnant(tape, self.held, HeldNodes::record);
+        remnant(tape, self.holding, HeldNodesState::record);
+        remnant(tape, self.winding, WindingProgress::record);
+        remnant(tape, self.tie, TieProgress::record);
     }
 }
 
-/// A component that may be missing, then or now.
+/// A component that may be missing, then or now: that is as good as its default.
 fn part<T: Default>(
     tape: &mut Tape<'_>,
     component: Option<&mut T>,
@@ -166,9 +166,20 @@ fn part<T: Default>(
     tape.flags([&mut was_there]);
     match component {
         Some(component) if was_there => record(component, tape),
+        Some(component) => *component = T::default(),
         None if was_there => record(&mut T::default(), tape),
-        _ => {}
+        None => {}
     }
+}
+
+/// One that comes with a rod or a tie and stays when that is gone.
+fn remnant<T: Default + PartialEq>(
+    tape: &mut Tape<'_>,
+    component: Option<&mut T>,
+    record: impl FnOnce(&mut T, &mut Tape<'_>),
+) {
+    let writes = matches!(tape, Tape::Write(_));
+    part(tape, component.filter(|is| !writes || **is != T::default()), record);
 }
 
 /// The components of a hair.

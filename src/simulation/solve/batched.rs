@@ -75,6 +75,11 @@ pub(super) trait Batched: Sized + Send {
     fn most_strain(_params: &Self::Params) -> f32 {
         0.5
     }
+    /// Strain of an edge by whose size a strand counts as jammed, where the solver keeps lengths far better otherwise: it
+    /// then comes to its lengths.
+    fn most_free_strain(_params: &Self::Params) -> Option<f32> {
+        None
+    }
     /// Whether a second attempt differs from the first.
     fn may_repeat(_params: &Self::Params) -> bool {
         false

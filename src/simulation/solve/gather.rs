@@ -71,15 +71,17 @@ pub(super) fn scatter<T: Batched>(
 ) -> u32 {
     let mut failed = 0;
     let kept = T::kept(params);
+    let most_free = T::most_free_strain(params);
+    let strained = most_free.map_or(0, |most| strained(block, most));
     for (group, four) in items.chunks_mut(4).enumerate() {
         let lanes = 4 * group..4 * group + four.len();
         let any_held = four.iter().any(|item| item.held.is_some());
-        match four {
+        match &mut *four {
             [a, b, c, d] if block.finite[lanes.clone()] == [0.0; 4] && !any_held => {
                 scatter_four(block, group, [a, b, c, d].map(|item| &mut *item.strand), kept);
             }
             four => {
-                for (lane, item) in lanes.zip(four) {
+                for (lane, item) in lanes.clone().zip(four.iter_mut()) {
                     if gives_way(block, lane, item, params) {
                         continue;
                     }
@@ -91,8 +93,30 @@ pub(super) fn scatter<T: Batched>(
                 }
             }
         }
+        let is_strained = |lane: usize| strained & !failed & 1 << lane != 0;
+        if let Some(most) = most_free.filter(|_| lanes.clone().any(is_strained)) {
+            let frame_delta = T::frame_delta(params).unwrap_or_default();
+            // Those that have given way have kept their lengths.
+            for (_, item) in lanes.zip(four).filter(|(lane, _)| is_strained(*lane)) {
+                item.strand.come_to_length(most, frame_delta, T::dt(params));
+            }
+        }
     }
     failed
+}
+
+/// A bit for each lane of which an edge is stretched or crushed by more than this.
+fn strained(block: &BlockLanes, most: f32) -> u32 {
+    let (low, high) = ((1.0 - most) * (1.0 - most), (1.0 + most) * (1.0 + most));
+    let mut off = [0u32; LANES];
+    for (ends, edge) in block.nodes.windows(2).zip(&block.edges) {
+        for (lane, off) in off.iter_mut().enumerate() {
+            let [x, y, z] = [0, 1, 2].map(|axis| ends[1].p[axis][lane] - ends[0].p[axis][lane]);
+            let (squared, l) = (x * x + y * y + z * z, edge.l[lane] * edge.l[lane]);
+            *off |= u32::from(squared < low * l) | u32::from(squared > high * l);
+        }
+    }
+    off.iter().zip(0..).map(|(off, lane)| off << lane).sum()
 }
 
 /// Whether a strand with held nodes does not take the substep, and stays where it was.
@@ -107,12 +131,11 @@ fn gives_way<T: Batched>(
     if block.finite[lane] != 0.0 && (held.is_let_go() || !item.strand.is_finite()) {
         return false;
     }
-    let gives = !held.accepts(item.strand, most_strain, |node| take3(&block.nodes[node].p, lane));
-    if gives {
-        let frame_delta = T::frame_delta(params).unwrap_or_default();
-        item.strand.give_way(held.nodes, most_strain, frame_delta, T::dt(params));
-    }
-    gives
+    let place = |node: usize| take3(&block.nodes[node].p, lane);
+    let Err(last) = held.accepts(item.strand, most_strain, place) else { return false };
+    let frame_delta = T::frame_delta(params).unwrap_or_default();
+    item.strand.give_way(last, most_strain, frame_delta, T::dt(params));
+    true
 }
 
 fn scatter_four(block: &BlockLanes, group: usize, strands: [&mut Strand; 4], kept: Kept) {

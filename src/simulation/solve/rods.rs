@@ -35,6 +35,9 @@ use crate::{
 use bevy::{math::Isometry3d, prelude::*};
 use fearless_simd::Level;
 
+/// Strain by which solids jam hair whose lengths the direct method keeps to a thousandth otherwise.
+const MOST_STRAIN: f32 = 0.04;
+
 /// Cosserat rods: the elastic projection.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RodPlugin;
@@ -107,8 +110,15 @@ impl<'a> Batched for RodColumns<'a> {
 
     fn most_strain(params: &HairParams<'_>) -> f32 {
         match params.method {
-            Method::Direct(_) => 0.04,
+            Method::Direct(_) => MOST_STRAIN,
             Method::Sweeps(..) => 0.05,
+        }
+    }
+
+    fn most_free_strain(params: &HairParams<'_>) -> Option<f32> {
+        match params.method {
+            Method::Direct(_) => Some(MOST_STRAIN),
+            Method::Sweeps(..) => None,
         }
     }
 

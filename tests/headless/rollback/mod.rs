@@ -1,9 +1,11 @@
 //! What a hair's bits hang on: its own state, not what else lives in the world. And that this state can be taken and put
 //! back.
 
+mod cycles;
+
 use crate::common::*;
 use bevy::{ecs::system::RunSystemOnce, prelude::*, time::TimeUpdateStrategy};
-use bevy_keratin::{MotionOwner, SleepCounts, prelude::*};
+use bevy_keratin::{MotionOwner, prelude::*};
 
 /// Where the other character stands (m).
 const FAR: Vec3 = Vec3::new(50.0, 0.0, 0.0);
@@ -14,11 +16,10 @@ enum Scene {
     Dry,
     Gusts,
     Wet,
-    BlowDry,
 }
 
-/// A head with hair in locks that touch, and what the scene does to it. Returns the hair.
-fn character(world: &mut World, scene: Scene, at: Vec3) -> Entity {
+/// A head with so many strands in locks that touch. Returns the hair.
+fn character(world: &mut World, at: Vec3, strands: usize) -> Entity {
     let head = HairCollider::sphere(0.09).unwrap();
     world.spawn((head, Transform::from_translation(at)));
     let shoulders = HairCollider::capsule(0.07, 0.3).unwrap();
@@ -26,7 +27,7 @@ fn character(world: &mut World, scene: Scene, at: Vec3) -> Entity {
     let below = at - Vec3::Y * 0.2;
     world.spawn((shoulders, Transform::from_translation(below).with_rotation(across)));
     let hair = world.spawn((Hair, Transform::from_translation(at))).id();
-    for i in 0..50 {
+    for i in 0..strands {
         let turn = 2.4 * i as f32;
         let up = 0.95 - 0.01 * i as f32;
         let out = (1.0 - up * up).sqrt();
@@ -36,6 +37,12 @@ fn character(world: &mut World, scene: Scene, at: Vec3) -> Entity {
         let points: Vec<Vec3> = (0..nodes).map(|k| out * along(k)).collect();
         world.spawn((StrandOf(hair), Strand::from_polyline(&points).unwrap()));
     }
+    hair
+}
+
+/// The same, and what the scene does to it.
+fn character_in(world: &mut World, scene: Scene, at: Vec3) -> Entity {
+    let hair = character(world, at, 50);
     if scene == Scene::Wet {
         world.trigger(SoakHair::dripping(hair));
         let cloud =
@@ -98,10 +105,10 @@ fn after_a_second(scene: Scene, other: Option<Other>) -> Vec<u64> {
     let mut app = app_in(scene);
     let comes_first = matches!(other, Some(Other::Stays | Other::Leaves | Other::LosesAStrand));
     let before: Vec<Entity> = app.world_mut().query::<Entity>().iter(app.world()).collect();
-    let there = comes_first.then(|| character(app.world_mut(), scene, FAR));
+    let there = comes_first.then(|| character_in(app.world_mut(), scene, FAR));
     let theirs: Vec<Entity> = app.world_mut().query::<Entity>().iter(app.world()).collect();
     let theirs: Vec<Entity> = theirs.into_iter().filter(|e| !before.contains(e)).collect();
-    let hair = character(app.world_mut(), scene, Vec3::ZERO);
+    let hair = character_in(app.world_mut(), scene, Vec3::ZERO);
     let mine = strands_of(&app, hair);
     run(&mut app, 0.3);
     match other {
@@ -113,7 +120,7 @@ fn after_a_second(scene: Scene, other: Option<Other>) -> Vec<u64> {
             app.world_mut().despawn(one);
         }
         Some(Other::Comes) => {
-            character(app.world_mut(), scene, FAR);
+            character_in(app.world_mut(), scene, FAR);
         }
         Some(Other::Marker) => mine.iter().step_by(3).for_each(|e| {
             app.world_mut().entity_mut(*e).insert(Marker);
@@ -147,154 +154,6 @@ fn bits_of_hair_in_gusts_hang_on_nothing_else_in_the_world() {
 #[test]
 fn bits_of_wet_hair_hang_on_nothing_else_in_the_world() {
     hangs_on_nothing_else(Scene::Wet);
-}
-
-/// What is rolled back, and what was seen at each tick.
-#[derive(Resource)]
-struct Past {
-    scene: Scene,
-    hair: Entity,
-    head: Entity,
-    tick: usize,
-    seen: Vec<(HairSnapshot, HairWorldSnapshot)>,
-    random: u32,
-    cycles: usize,
-    asleep: usize,
-}
-
-impl Past {
-    /// A number below `most`.
-    fn below(&mut self, most: usize) -> usize {
-        self.random = self.random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (self.random >> 8) as usize % most
-    }
-}
-
-/// Where bytes differ, and of how many.
-fn differ(a: &[u8], b: &[u8]) -> Vec<(usize, usize)> {
-    let other = (16..a.len().max(b.len())).filter(|i| a.get(*i) != b.get(*i));
-    other.map(|i| (i, b.len())).take(8).collect()
-}
-
-/// At the beginning of a tick: the state is what it was when the tick ran before. Now and then it is an earlier one.
-fn roll_back(mut past: ResMut<Past>, mut hairs: HairSnapshots) -> Result {
-    let (hair, tick) = (past.hair, past.tick);
-    let (mut own, mut world) = (HairSnapshot::default(), HairWorldSnapshot::default());
-    hairs.take(hair, &mut own)?;
-    hairs.take_world(&mut world)?;
-    match past.seen.get(tick) {
-        Some((first, shared)) => {
-            let of = format!("tick {tick} in {:?}", past.scene);
-            assert_eq!(differ(&own.to_bytes(), &first.to_bytes()), [], "hair in {of}");
-            assert_eq!(differ(&world.to_bytes(), &shared.to_bytes()), [], "world in {of}");
-            assert!(own == *first && own.hash() == first.hash() && world == *shared);
-        }
-        None => past.seen.push((own, world)),
-    }
-    if let Some(long_ago) = tick.checked_sub(40) {
-        past.seen[long_ago] = default();
-    }
-    if past.below(12) == 0 && tick > 0 {
-        let back = past.below(12.min(tick));
-        let to = tick - back;
-        let (own, world) = &past.seen[to];
-        let (own, world) = (
-            HairSnapshot::from_bytes(&own.to_bytes())?,
-            HairWorldSnapshot::from_bytes(&world.to_bytes())?,
-        );
-        hairs.restore(hair, &own)?;
-        hairs.restore_world(&world)?;
-        past.tick = to;
-        past.cycles += 1;
-    }
-    Ok(())
-}
-
-/// What the game does in a tick, which it does again after a rollback.
-fn play(
-    mut past: ResMut<Past>,
-    mut places: Query<&mut Transform>,
-    blowers: Query<Entity, With<Blower>>,
-    counts: Query<&SleepCounts>,
-    mut soak: MessageWriter<SoakHair>,
-) -> Result {
-    let t = past.tick as f32;
-    let mut head = places.get_mut(past.head)?;
-    // A second in motion, two at rest.
-    let stride = (t % 180.0).min(60.0) * 0.2;
-    head.translation = Vec3::new(0.05 * stride.sin(), 0.02 * stride.cos(), 0.0);
-    head.rotation = Quat::from_rotation_y(0.4 * stride.sin());
-    for blower in &blowers {
-        *places.get_mut(blower)? =
-            Transform::from_xyz(0.3, 0.1, 0.2 * (0.1 * t).sin()).looking_at(Vec3::ZERO, Vec3::Y);
-    }
-    if past.scene != Scene::Dry && past.tick % 100 == 3 {
-        soak.write(SoakHair::dripping(past.hair));
-    }
-    past.asleep += usize::from(counts.get(past.hair)?.asleep > 0);
-    past.tick += 1;
-    Ok(())
-}
-
-/// Cycles of rolling back at random ticks.
-fn cycles(scene: Scene, count: usize) -> App {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, HairPlugins::new(FixedPostUpdate)))
-        .insert_resource(Time::<Fixed>::from_hz(60.0))
-        .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
-    set_up(&mut app, scene);
-    let world = app.world_mut();
-    let hair = character(world, scene, Vec3::ZERO);
-    let head = world.spawn(Transform::default()).id();
-    let solids: Vec<Entity> =
-        world.query_filtered::<Entity, With<HairCollider>>().iter(world).collect();
-    world.entity_mut(head).add_child(hair).add_children(&solids);
-    // Beside it goes dry hair that is not rolled back.
-    character(world, Scene::Dry, FAR);
-    if scene == Scene::BlowDry {
-        world.spawn(Blower::default());
-    }
-    let (seen, random) = (Vec::new(), 7);
-    let past = Past { scene, hair, head, tick: 0, seen, random, cycles: 0, asleep: 0 };
-    app.insert_resource(past).add_systems(FixedUpdate, (roll_back, play).chain());
-    app.finish();
-    app.cleanup();
-    while app.world().resource::<Past>().cycles < count {
-        app.update();
-    }
-    app
-}
-
-#[test]
-fn dry_hair_that_is_rolled_back_goes_on_to_the_same_bits() {
-    let _ = cycles(Scene::Dry, 10);
-}
-
-#[test]
-fn hair_in_gusts_that_is_rolled_back_goes_on_to_the_same_bits() {
-    let _ = cycles(Scene::Gusts, 10);
-}
-
-#[test]
-fn wet_hair_that_is_rolled_back_goes_on_to_the_same_bits() {
-    let _ = cycles(Scene::Wet, 10);
-}
-
-#[test]
-fn hair_under_a_dryer_that_is_rolled_back_goes_on_to_the_same_bits() {
-    let _ = cycles(Scene::BlowDry, 10);
-}
-
-/// As many as a game has in some minutes.
-#[test]
-#[ignore = "takes minutes"]
-fn hair_that_is_rolled_back_a_thousand_times_goes_on_to_the_same_bits() {
-    for scene in [Scene::Dry, Scene::BlowDry, Scene::Wet, Scene::Gusts] {
-        let app = cycles(scene, 1000);
-        let Past { tick, asleep, seen, .. } = app.world().resource::<Past>();
-        let bytes = seen.last().map_or(0, |(own, _)| own.size());
-        println!("{scene:?}: {tick} ticks, {asleep} with sleepers, {} bytes a strand", bytes / 50);
-    }
 }
 
 /// What a snapshot of a hair says in a system of the app.
