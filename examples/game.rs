@@ -144,14 +144,11 @@ fn walk(
         let facing = Transform::default().looking_to(-ahead, Vec3::Y).rotation;
         at.rotation = at.rotation.slerp(facing, (6.0 * dt).min(1.0));
     }
-    if hero.height == 0.0 && keys.just_pressed(Space) {
-        hero.rise = 4.0;
+    if hero.height == 0.0 {
+        hero.rise = if keys.just_pressed(Space) { 4.0 } else { 0.0 };
     }
     hero.rise -= 9.81 * dt;
     hero.height = (hero.height + hero.rise * dt).max(0.0);
-    if hero.height == 0.0 {
-        hero.rise = 0.0;
-    }
     at.translation.y = ground(at.translation) + hero.height;
 }
 

@@ -426,7 +426,7 @@ pub(super) fn start(world: &mut World, all: &mut QueryState<(Entity, &mut Wearin
 
 /// For each hair that is to be worn the one that is it already, on the same meshes.
 fn kept(world: &World, wearing: &Wearing, found: &Found) -> Vec<Option<Entity>> {
-    let is_as_made = |worn: &&Worn| !worn.is_stale && !(wearing.settles && worn.is_carried);
+    let is_as_made = |worn: &&Worn| !(worn.is_stale || wearing.settles && worn.is_carried);
     let worn = wearing.worn.iter().filter(is_as_made);
     let worn: Vec<_> =
         worn.filter_map(|worn| Some((worn.hair, world.get::<WornAs>(worn.hair)?))).collect();
