@@ -170,19 +170,11 @@ fn a_crowd_is_planted_once() {
     assert!(frames <= at_once, "they came in {frames} frames, not {at_once}");
 }
 
-/// How long this thread and those that help it with frames have been at work (s), where the system tells: other work does
-/// not count, on the pools for that or elsewhere on the machine.
+/// How long this thread, which runs the frames, has been at work (s), where the system tells: what else runs on the machine
+/// does not count.
 fn at_work() -> Option<f64> {
-    let threads = std::fs::read_dir("/proc/self/task").ok()?;
-    let (own, read) =
-        (std::fs::read_to_string("/proc/thread-self/comm").ok()?, std::fs::read_to_string);
-    let busy = threads.flatten().filter_map(|thread| {
-        let name = read(thread.path().join("comm")).ok()?;
-        let is_frame = name == own || name.starts_with("Compute");
-        let time = read(thread.path().join("schedstat")).ok().filter(|_| is_frame)?;
-        time.split(' ').next()?.parse::<f64>().ok()
-    });
-    Some(1e-9 * busy.sum::<f64>())
+    let times = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(1e-9 * times.split(' ').next()?.parse::<f64>().ok()?)
 }
 
 /// How long frames take (ms) in which so many join at once, beside a hair that sleeps: the longest before, and each frame

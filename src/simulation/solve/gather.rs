@@ -105,11 +105,13 @@ pub(super) fn scatter<T: Batched>(
     failed
 }
 
-/// A bit for each lane of which an edge is stretched or crushed by more than this.
+/// A bit for each lane of which an edge is stretched or crushed by more than this; but a tip that a solid meets end-on may
+/// be pressed for a substep or two, until it gives way sideways.
 fn strained(block: &BlockLanes, most: f32) -> u32 {
-    let (low, high) = ((1.0 - most) * (1.0 - most), (1.0 + most) * (1.0 + most));
+    let high = (1.0 + most) * (1.0 + most);
     let mut off = [0u32; LANES];
-    for (ends, edge) in block.nodes.windows(2).zip(&block.edges) {
+    for (i, (ends, edge)) in block.nodes.windows(2).zip(&block.edges).enumerate() {
+        let low = if i + 2 < block.nodes.len() { (1.0 - most) * (1.0 - most) } else { 0.0 };
         for (lane, off) in off.iter_mut().enumerate() {
             let [x, y, z] = [0, 1, 2].map(|axis| ends[1].p[axis][lane] - ends[0].p[axis][lane]);
             let (squared, l) = (x * x + y * y + z * z, edge.l[lane] * edge.l[lane]);

@@ -233,7 +233,7 @@ fn play(world: &mut World) {
                         world.entity_mut(*strand).remove::<Tied>();
                     }),
                     170..200 => {
-                        let aside = Vec3::new(0.1, 0.12, 0.002 * (t % 240.0 - 170.0));
+                        let aside = Vec3::new(0.07, 0.12, 0.001 * (t % 240.0 - 170.0));
                         let mut targets = vec![None; 8];
                         targets[7] = Some(aside);
                         let held = HeldNodes { targets, ..default() };
