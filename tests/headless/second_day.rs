@@ -69,20 +69,18 @@ fn rain_and_a_dive_are_seen_at_once() {
     let ids = strands(&app, hair);
     let place = *app.world().get::<GlobalTransform>(hair).unwrap();
     let rain = app.world_mut().spawn(Shower::rain_on(place.translation())).id();
-    for tick in 0..360 {
-        app.update();
-        if [15, 30, 60, 120, 240, 359].contains(&tick) {
-            println!("{} s of rain: {:?}", tick as f32 / 60.0, wetness(&app, &ids));
-        }
-    }
+    run(&mut app, 1.0);
+    // 4 ml a second within a circle of 60 cm: the head gets a hundredth of a full film.
+    let (wet, mass) = wetness(&app, &ids);
+    println!("a second of rain: {wet}, {mass}");
+    assert!(wet > 0.03 && mass > 0.003, "{wet}, {mass}");
     app.world_mut().despawn(rain);
     let lake = Transform::from_translation(place.translation() + Vec3::Y);
     let lake = app.world_mut().spawn((WaterVolume::lake(), lake)).id();
     run(&mut app, 1.0);
-    println!("in the lake: {:?}", wetness(&app, &ids));
     app.world_mut().despawn(lake);
     run(&mut app, 0.5);
     let (wet, mass) = wetness(&app, &ids);
     println!("0.5 s after: {wet}, {mass}");
-    assert!(wet > 0.95 && mass > 0.5, "{wet}, {mass}");
+    assert!(wet > 0.95 && mass > 0.3, "{wet}, {mass}");
 }
