@@ -8,7 +8,7 @@ use std::sync::RwLock;
 
 const NO_DEVICE: &str = "no Vulkan driver; Debian's mesa-vulkan-drivers draws in software";
 
-/// Read by tests that run beside each other, written by one that measures time.
+/// Read by tests that run beside each other, written by one that runs alone.
 static MACHINE: RwLock<()> = RwLock::new(());
 
 /// A test that needs a device.
@@ -19,7 +19,8 @@ pub fn device(name: &str, test: fn()) -> Trial {
     })
 }
 
-/// A test that needs a device and measures time: no other of its program runs meanwhile.
+/// A test that needs a device and measures time, or destroys its device, which may crash a driver that another test is
+/// using: no other of its program runs meanwhile.
 pub fn alone(name: &str, test: fn()) -> Trial {
     on_device(name, move || {
         let _alone = MACHINE.write();

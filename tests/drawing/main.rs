@@ -89,8 +89,8 @@ device::tests! {
             coincident_guides_and_nodes_are_drawn,
             water_is_drawn_as_beads_as_long_as_there_is_any,
             soaked_hair_is_darker_and_droplets_are_seen,
-            views_do_not_disturb_each_other_nor_does_a_minimised_window,
-            hair_and_water_outlive_a_lost_device;
+            views_do_not_disturb_each_other_nor_does_a_minimised_window;
+        alone: hair_and_water_outlive_a_lost_device;
     }
     groom {
         device: followers_are_drawn_where_they_are_given_and_no_more_than_asked_for;

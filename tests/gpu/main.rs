@@ -72,8 +72,8 @@ device::tests! {
             a_record_is_as_long_whatever_it_holds;
     }
     pictures {
+        alone: hair_goes_on_from_its_checkpoint_when_the_device_is_lost;
         device: pictures_of_hair_on_the_device_and_at_home_are_the_same,
-            hair_goes_on_from_its_checkpoint_when_the_device_is_lost,
             kernels_that_cannot_be_compiled_leave_hair_at_home;
     }
     pipelined {

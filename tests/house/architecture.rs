@@ -367,9 +367,10 @@ fn no_file_is_too_long_to_be_understood() {
 /// 43,069 before hair resisted twist as a fibre does, 43,229 before roots followed bones by name, 44,200 before what is
 /// put on a character or asked of it acted on its hair, 44,850 before held hair gave way, hair was tied and wet hair took
 /// the substeps of dry hair, 45,900 before hair could be rolled back and cut, and worn hair settled off the main thread, was
-/// made once for a crowd and changed under a slider or at a tick of the game's choice.
+/// made once for a crowd and changed under a slider or at a tick of the game's choice,
+/// 48,850 before hats, several hairs of one wear, and hair that comes to its lengths where solids jam it.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 49_400;
+const MOST_LINES: usize = 49_480;
 
 #[test]
 fn the_crate_stays_small() {

@@ -327,6 +327,7 @@ pub(super) fn make(
 }
 
 /// Lays a hair, as it settles, as hair of the same roots did before, or as planted where a saved style is put on it.
+#[cfg_attr(not(feature = "save"), allow(unused_variables, reason = "a saved style is put on"))]
 fn finish(
     order: &MakeInput,
     wear: &WearHair,

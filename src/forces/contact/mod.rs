@@ -74,6 +74,19 @@ pub struct Obstacles {
     hats: Vec<hat::WornHat>,
 }
 
+impl Obstacles {
+    /// Whether this collider is a hat that holds the hair.
+    pub(crate) fn is_held_by(&self, collider: Entity) -> bool {
+        self.hats.iter().any(|hat| hat.id == collider)
+    }
+
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
+        let count = tape.count(self.hats.len(), size_of::<f32>());
+        self.hats.resize(count, hat::WornHat::new(Entity::PLACEHOLDER));
+        self.hats.iter_mut().for_each(|hat| hat.record(tape));
+    }
+}
+
 /// The pairs of strands of one hair that may touch.
 #[doc(hidden)]
 #[derive(Component, Reflect, Clone, Debug, Default)]

@@ -3,7 +3,7 @@
 use super::{
     Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError,
     LockNeighbours, Obstacles, Openings, StrandContact, coarse,
-    hat::find_hats,
+    hat::WornHat,
     lanes::Penalty,
     neighbours::Lookup,
     reach::{Ball, Colliders, HairReach, LOOK_AGAIN},
@@ -24,7 +24,7 @@ use crate::{
             Hair, HairHere, MotionOwner, Regroomed, SleepCounts, SleepPose, Strand, StrandOf,
             StrandSleep, Strands, TickPose, keep_required, lacks_strands,
         },
-        worn,
+        worn::{self, WornBy},
     },
     solver::rod::{
         obstacle::{Obstacle, Solid},
@@ -125,6 +125,41 @@ fn gather_colliders(
     // Not of their rows, which change with what else lives in the world.
     placed.sort_by_key(|(_, collider)| collider.id.index_u32());
     *all = Colliders::new(step.count, placed);
+}
+
+/// At the start of a tick: a hat holds hair that is worn by an entity above it, that is a child of one, or that lies below
+/// its parent.
+fn find_hats(
+    colliders: Res<TickColliders>,
+    parents: Query<&ChildOf>,
+    mut hairs: Query<(Entity, Option<&WornBy>, &mut Obstacles), With<Hair>>,
+    mut hats: Local<Vec<Entity>>,
+) {
+    hats.clear();
+    let is_hat = |shape: &ColliderShape| matches!(shape, ColliderShape::Hat { .. });
+    hats.extend(colliders.iter().filter(|of| is_hat(&of.collider.shape)).map(|of| of.id));
+    for (hair, worn, mut obstacles) in &mut hairs {
+        let worn_hats = &mut obstacles.bypass_change_detection().hats;
+        if hats.is_empty() {
+            worn_hats.clear();
+            continue;
+        }
+        let parent = |of: Entity| parents.get(of).ok().map(|child| child.0);
+        let on = worn.map(|worn| worn.0).or_else(|| parent(hair));
+        let holds = |hat: &Entity| {
+            let is_above = on.is_some_and(|on| parents.iter_ancestors(*hat).any(|id| id == on));
+            is_above
+                || parent(*hat).is_some_and(|head| {
+                    hair == head || parents.iter_ancestors(hair).any(|id| id == head)
+                })
+        };
+        worn_hats.retain(|hat| hats.contains(&hat.id) && holds(&hat.id));
+        for hat in hats.iter().filter(|hat| holds(hat)) {
+            if !worn_hats.iter().any(|worn| worn.id == *hat) {
+                worn_hats.push(WornHat::new(*hat));
+            }
+        }
+    }
 }
 
 /// A collider in a hair's frame, with the motion of its surface during the substep. A hat keeps things out.
