@@ -280,13 +280,22 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
     ribbon[27] = followers.lock_shape;
     (ribbon[15], ribbon[16], ribbon[17]) =
         (followers.clump, followers.parting, followers.wet_clump);
-    // Two solids among the strands, one of them turned, and many small ones that overlap.
+    // Two solids among the strands, one of them turned, a hat that holds them and one that keeps them out, and many
+    // small ones that overlap.
     let place = Affine3A::from_rotation_translation(Quat::from_rotation_z(0.7), Vec3::Y * -0.1);
     let capsule = ColliderShape::Capsule(Capsule3d::new(0.03, 0.05));
     let mut solids = vec![
         DrawnSolid::ball(Vec3::new(0.02, -0.03, 0.01), 0.04).unwrap(),
         DrawnSolid::new(&capsule, &place, false).unwrap(),
     ];
+    let hat = |at: Vec3, turn: f32, size: f32, holds: bool| {
+        let shape = ColliderShape::Hat { radii: size * Vec3::new(1.0, 1.2, 1.1), rim: 0.3 * size };
+        let place = Affine3A::from_rotation_translation(Quat::from_rotation_x(turn), at);
+        DrawnSolid::new(&shape, &place, holds).unwrap()
+    };
+    let hats =
+        [hat(Vec3::Y * 0.01, 0.2, 0.1, true), hat(Vec3::new(0.0, -0.1, 0.05), -0.5, 0.05, false)];
+    solids.extend(hats);
     solids.extend((0..60).map(|_| DrawnSolid::ball(0.08 * random.vector(), 0.012).unwrap()));
     arrange(&mut solids);
     let frame = packed_frame(&solids);
@@ -315,7 +324,9 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
     let dry = |k: u32| Guide { moisture: &[], ..now(k) };
     let parted = HairFollowers { parting: 1e6, ..followers };
     let [mut worst, mut worst_past, mut worst_ring] = [0.0f32; 3];
-    let [mut parts, mut drawn_in, mut pushed, mut cut] = [0; 4];
+    let [mut parts, mut drawn_in, mut pushed, mut cut, mut hatted] = [0; 5];
+    let bare: Vec<DrawnSolid> =
+        solids.iter().filter(|solid| !hats.contains(solid)).copied().collect();
     for (k, strand) in strands.iter().enumerate() {
         for i in 0..SAMPLES {
             let t = i as f32 / (SAMPLES - 1) as f32;
@@ -335,6 +346,7 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
             parts += u32::from(differs(strand_point(strand, now, t, &parted, &solids)));
             drawn_in += u32::from(differs(strand_point(strand, dry, t, &followers, &solids)));
             pushed += u32::from(differs(strand_point(strand, now, t, &followers, &[])));
+            hatted += u32::from(differs(strand_point(strand, now, t, &followers, &bare)));
             let grown = |k: u32| Guide { end: None, ..now(k) };
             cut += u32::from(differs(strand_point(strand, grown, t, &followers, &solids)));
         }
@@ -342,11 +354,11 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
     println!("largest difference {worst} m, in the frame before {worst_past} m");
     println!("rings lose {worst_ring}");
     println!(
-        "{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out, {cut} cut"
+        "{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out, {hatted} by hats, {cut} cut"
     );
     assert!(worst < 1e-5 && worst_past < 1e-5, "shader and twin differ by {worst}, {worst_past} m");
     assert!((1e-6..1e-3).contains(&worst_ring), "packing a ring loses {worst_ring}");
-    assert!(parts.min(drawn_in).min(pushed).min(cut) > 100, "the data must contain all kinds");
+    assert!(parts.min(drawn_in).min(hatted).min(cut) > 100, "the data must contain all kinds");
 }
 
 const FIBRE: &str = "

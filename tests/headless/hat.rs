@@ -1,9 +1,9 @@
 //! A hat holds hair under it, put on and taken off, dry and wet, and keeps rain off.
 
 use crate::common::{fault_kinds, run, strand, test_app};
-use bevy::prelude::*;
-use bevy_keratin::prelude::*;
-use core::f32::consts::TAU;
+use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy_keratin::{SleepCounts, SolverMethod, StrandModel, prelude::*};
+use core::{f32::consts::TAU, time::Duration};
 
 const HEAD: f32 = 0.09;
 const HAT: Vec3 = Vec3::new(0.1, 0.105, 0.1);
@@ -187,4 +187,46 @@ fn a_hat_keeps_other_hair_and_rain_outside() {
     let nearest = p.iter().filter(|p| p.y > 1.6 + RIM).map(over).fold(f32::INFINITY, f32::min);
     println!("somebody's hair is at {nearest}");
     assert!((0.999..1.2).contains(&nearest), "{nearest}");
+}
+
+/// On a head that an animation turns and nods in frames of any length, by each kind of strand; then it stands still.
+#[test]
+fn a_hat_holds_hair_on_an_animated_head_until_it_sleeps() {
+    let kinds: [fn(&mut World, Entity); 3] = [
+        |_, _| {},
+        |world, hair| {
+            world.entity_mut(hair).insert(HairSolver { method: SolverMethod::Sweeps, ..default() });
+        },
+        |world, hair| {
+            world.entity_mut(hair).insert(StrandModel::MassSpring);
+        },
+    ];
+    for (kind, insert) in kinds.into_iter().enumerate() {
+        let mut scene = Scene::hanging(On::Head, Transform::default());
+        insert(scene.app.world_mut(), scene.hair);
+        run(&mut scene.app, 1.0);
+        scene.put_on();
+        let (mut most, mut strain, mut time) = (f32::NEG_INFINITY, 0.0_f32, 0.0);
+        for frame in 0..120 {
+            let dt = [0.004, 0.021, 0.05, 0.011][frame % 4];
+            time += dt;
+            let step = TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(dt));
+            scene.app.insert_resource(step);
+            let mut at = scene.app.world_mut().get_mut::<Transform>(scene.character).unwrap();
+            at.rotation =
+                Quat::from_euler(EulerRot::YXZ, (4.0 * time).sin(), 0.3 * (3.0 * time).sin(), 0.0);
+            scene.app.update();
+            most = most.max(scene.under().1);
+            let of = |id: &Entity| strand(&scene.app, *id).peak_strain();
+            strain = scene.strands.iter().map(of).fold(strain, f32::max);
+        }
+        let step = TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 60.0));
+        scene.app.insert_resource(step);
+        run(&mut scene.app, 8.0);
+        let counts = *scene.app.world().get::<SleepCounts>(scene.hair).unwrap();
+        println!("kind {kind}: {most} m outside, strain {strain}; asleep: {counts:?}");
+        assert!(most < 0.5e-3 && strain < 0.01, "{most} m outside, strain {strain}");
+        // Those that are squeezed between hat and head tremble on, most by the papers' projections.
+        assert!(counts.asleep >= [45, 15, 45][kind], "{counts:?}");
+    }
 }

@@ -13,6 +13,7 @@ use bevy::{math::Affine3A, prelude::*};
 const COMING_DOWN: f32 = 0.4;
 /// From how high it comes, in times its height.
 const ABOVE: f32 = 3.0;
+
 /// A hat that holds a hair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WornHat {
