@@ -10,7 +10,10 @@ use crate::{
     forces::environment::wind::REFERENCE_DISTANCE,
     keratin::bond::model::MIN_CLOSED_SHARE,
     render::{FAR, MOTION_UNITS},
-    simulation::lod::follow::{GUIDES, OWN_LASTS},
+    simulation::{
+        lod::follow::{GUIDES, OWN_LASTS},
+        solve::{MOST_STRAIN, MOST_SWEPT_STRAIN},
+    },
     solver::rod::{
         constraint::EPSILON,
         direct::{width::ROUNDING, *},
@@ -50,7 +53,7 @@ static CONSTANTS: LazyLock<String> = LazyLock::new(|| {
         f32 {
             THETA MAX_PUSH FAST_TURN STRAIN STRETCH_RATIO STRETCH_SHARE MAX_TENSION TORN MAX_STRAIN NEARER DEEP_SHARE MAX_BENDING_LENGTH MAX_STIFFNESS BUCKLING_TWIST HOLD ROUNDING
             REFERENCE_GRAVITY FIRMNESS TOUCHING REVERSING FOLDING TOLERANCE EPSILON FASTER ESCAPE_RATIO DEPTH_RATIO MIN_CLOSED_SHARE REFERENCE_DISTANCE
-            OWN_LASTS FAR MOTION_UNITS
+            OWN_LASTS FAR MOTION_UNITS MOST_STRAIN MOST_SWEPT_STRAIN
         }
     };
     all.concat()

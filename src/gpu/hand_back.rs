@@ -325,6 +325,11 @@ fn apply_report(world: &mut World, hair: Entity, report: &Measured, strand: Opti
     {
         *sleepers = SleepCounts { asleep: sleepers.asleep + sleepers.awake, awake: 0 };
     }
+    if report.gives_way
+        && let Some(mut gpu) = entity.get_mut::<GpuHair>()
+    {
+        gpu.unsupported.get_or_insert(Unsupported::HeldNodes);
+    }
     let count = report.put_back + report.rebuilt;
     let Some(mut gpu) = entity.get_mut::<GpuHair>().filter(|_| count > 0) else { return };
     let is_known = core::mem::replace(&mut gpu.quiet, REPORT_COOLDOWN) > 0;

@@ -99,8 +99,8 @@ pub enum Unsupported {
     Colliders,
     /// A collider near that is no ball, ellipsoid, capsule, cylinder or half-space.
     ColliderShape,
-    /// Roots that are held ([`HeldNodes`](crate::HeldNodes)), or held nodes with frames.
-    HeldRoots,
+    /// Held nodes ([`HeldNodes`](crate::HeldNodes)) that are roots, have frames, or have to give way.
+    HeldNodes,
     /// Strands of which winding on a [`PermRod`](crate::PermRod), or gathering to a [`HairTie`](crate::HairTie),
     /// begins.
     Winding,
@@ -158,7 +158,9 @@ impl fmt::Display for Unsupported {
             Self::ColliderShape => {
                 "colliders other than balls, ellipsoids, capsules, cylinders and half-spaces are not supported there"
             }
-            Self::HeldRoots => "held roots are not supported there",
+            Self::HeldNodes => {
+                "held roots, held nodes with frames and those that have to give way are not supported there"
+            }
             Self::Winding => "its strands begin to be wound on a rod or gathered to a tie",
             Self::MovingRoots => "its roots are being tied to a mesh",
             Self::LevelOfDetail => "at its level of detail other strands are simulated, or none",

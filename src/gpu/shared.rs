@@ -380,6 +380,8 @@ pub(super) struct Measured {
     pub(super) rebuilt: u32,
     /// The number of one of them.
     pub(super) first: Option<u32>,
+    /// Whether a strand with held nodes has to give way.
+    pub(super) gives_way: bool,
     /// The corners of the box around all nodes (m), and their highest speed (m/s).
     pub(super) low: [f32; 3],
     pub(super) high: [f32; 3],
@@ -399,6 +401,7 @@ impl Measured {
             put_back: words[0],
             rebuilt: words[1],
             first: (words[2] != 0).then_some(!words[2]),
+            gives_way: words[3] != 0,
             high: [4, 5, 6].map(|i| number(words[i])),
             low: [7, 8, 9].map(|i| number(!words[i])),
             speed: f32::from_bits(words[10]).sqrt(),
@@ -418,7 +421,7 @@ mod tests {
             if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
         };
         let mut words = [0u32; 16];
-        (words[0], words[1], words[2]) = (3, 1, !17);
+        (words[0], words[1], words[2], words[3]) = (3, 1, !17, 1);
         let (high, low) = ([0.5, -0.25, 1e-3], [-0.5, -2.0, 0.0]);
         for axis in 0..3 {
             words[4 + axis] = ordered(high[axis]);
@@ -427,8 +430,16 @@ mod tests {
         words[10] = 4.0f32.to_bits();
         words[SLEPT] = 77;
         let read = Measured::of(bytemuck::cast_slice(&words));
-        let expected =
-            Measured { put_back: 3, rebuilt: 1, first: Some(17), low, high, speed: 2.0, slept: 77 };
+        let expected = Measured {
+            put_back: 3,
+            rebuilt: 1,
+            first: Some(17),
+            gives_way: true,
+            low,
+            high,
+            speed: 2.0,
+            slept: 77,
+        };
         assert_eq!(read, expected);
         assert!(ordered(-1.0) < ordered(-0.5) && ordered(-0.5) < ordered(0.25), "in order");
     }

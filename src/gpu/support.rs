@@ -13,7 +13,9 @@ use crate::{
         contact::{Obstacles, StrandContact},
         environment::{WindReceived, Winds},
     },
-    hair::strand::{Hair, HeldNodes, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose},
+    hair::strand::{
+        Hair, HeldNodes, HeldNodesState, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose,
+    },
     hairdo::{
         style::HairStyle,
         tie::{TieProgress, Tied},
@@ -53,7 +55,11 @@ pub(super) struct Support<'w, 's> {
         ),
         With<Hair>,
     >,
-    held: Query<'w, 's, (Entity, &'static StrandOf, &'static HeldNodes)>,
+    held: Query<
+        'w,
+        's,
+        (Entity, &'static StrandOf, &'static HeldNodes, Option<&'static HeldNodesState>),
+    >,
     wound: Query<
         'w,
         's,
@@ -79,10 +85,12 @@ impl Support<'_, '_> {
     /// Reasons of single strands, by hair.
     pub(super) fn of_strands(&self) -> EntityHashMap<Unsupported> {
         let mut found = EntityHashMap::default();
-        let held = self.held.iter().filter(|(.., held)| {
-            matches!(held.targets.first(), Some(Some(_))) || held.frames.iter().any(Option::is_some)
+        let held = self.held.iter().filter(|(.., held, state)| {
+            matches!(held.targets.first(), Some(Some(_)))
+                || held.frames.iter().any(Option::is_some)
+                || state.is_some_and(HeldNodesState::gives_way)
         });
-        found.extend(held.map(|(_, of, _)| (of.0, Unsupported::HeldRoots)));
+        found.extend(held.map(|(_, of, ..)| (of.0, Unsupported::HeldNodes)));
         let begins = self.wound.iter().filter(|(_, strand, on, settings, wound)| {
             self.rods.contains(on.0) && wound.waits(strand, settings)
         });
@@ -101,7 +109,7 @@ impl Support<'_, '_> {
         let held = self
             .held
             .iter()
-            .filter(|(_, of, held)| of.0 == hair && held.targets.iter().any(Option::is_some));
+            .filter(|(_, of, held, _)| of.0 == hair && held.targets.iter().any(Option::is_some));
         let mut held: Vec<Entity> = held.map(|(strand, ..)| strand).collect();
         held.sort_unstable();
         Some(held)

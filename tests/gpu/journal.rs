@@ -166,7 +166,7 @@ pub fn what_the_kernels_lack_keeps_hair_on_the_processor_and_is_reported() {
         let targets = vec![Some(Vec3::X)];
         app.world_mut().entity_mut(strand).insert(HeldNodes { targets, ..default() });
     });
-    assert_eq!(held, Some(Unsupported::HeldRoots));
+    assert_eq!(held, Some(Unsupported::HeldNodes));
     let settles = reported(|app, hair| {
         app.world_mut().entity_mut(hair).insert(Settling::default());
     });

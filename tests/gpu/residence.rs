@@ -36,7 +36,7 @@ pub fn grow(stage: &mut Stage, on: SimulateOn, strands: Vec<Strand>) {
 pub fn hair_goes_to_the_device_and_comes_home() {
     let mut stage = Stage::new(SimulateOn::Cpu, Vec::new());
     stage.compile();
-    let all: [fn(&mut Stage); 43] = [
+    let all: [fn(&mut Stage); 44] = [
         hand_over_and_return_without_a_tick_change_no_bit,
         hair_on_the_device_moves_as_on_the_processor_and_comes_home_as_it_is,
         ten_runs_and_any_number_of_ticks_a_frame_give_the_same_bits,
@@ -57,6 +57,7 @@ pub fn hair_goes_to_the_device_and_comes_home() {
         closed_forms_hold_through_the_app,
         targets::roots_on_a_mesh_go_with_it_there,
         targets::held_nodes_move_there_and_are_released,
+        targets::held_nodes_that_have_to_give_way_do_so_on_the_cpu,
         targets::strands_are_wound_there_and_keep_their_curl,
         lod::followers_follow_there_as_on_the_processor,
         lod::a_change_of_level_is_made_on_the_processor,

@@ -142,8 +142,41 @@ pub fn held_nodes_move_there_and_are_released(stage: &mut Stage) {
     let root = HeldNodes { targets: vec![Some(Vec3::Y * 0.09)], ..default() };
     stage.app.world_mut().entity_mut(strand).insert(root);
     stage.run(1);
-    let why = WhyCpu::Unsupported(Unsupported::HeldRoots);
+    let why = WhyCpu::Unsupported(Unsupported::HeldNodes);
     assert_eq!(stage.residence(), HairResidence::Cpu(why));
+}
+
+pub fn held_nodes_that_have_to_give_way_do_so_on_the_cpu(stage: &mut Stage) {
+    let head = stage.app.world_mut().spawn(HairCollider::sphere(0.08).unwrap()).id();
+    on_gpu(stage, 6, 7);
+    let (strand, began) = (stage.members()[0], stage.strands().remove(0));
+    let (tip, from) = (began.edges(), began.positions()[began.edges()]);
+    let (mut there, mut reports, mut strains) = (0, 0, [0.0f32; 2]);
+    for tick in 1..=120 {
+        // Led into the head.
+        let mut targets = vec![None; tip];
+        targets.push(Some(from * (1.0 - 0.8 * (tick as f32 / 60.0).min(1.0))));
+        stage.app.world_mut().entity_mut(strand).insert(HeldNodes { targets, ..default() });
+        stage.run(1);
+        reports += stage.faults().iter().filter(|fault| fault.entity == Some(strand)).count();
+        if stage.is_on_gpu() {
+            there = tick;
+            continue;
+        }
+        let now = stage.app.world().get::<Strand>(strand).unwrap().peak_strain();
+        let is_home = usize::from(tick > there + 2);
+        strains[is_home] = strains[is_home].max(now);
+    }
+    println!("there for {there} ticks, comes home strained by {strains:?}");
+    let why = WhyCpu::Unsupported(Unsupported::HeldNodes);
+    assert_eq!(stage.residence(), HairResidence::Cpu(why));
+    assert!((5..60).contains(&there) && strains[0] < 0.3 && strains[1] < 0.05, "{strains:?}");
+    assert_eq!(reports, 1, "a target out of reach is told once");
+    // Free again it goes back.
+    stage.app.world_mut().entity_mut(strand).remove::<HeldNodes>();
+    stage.run(90);
+    assert!(stage.is_on_gpu(), "{:?}", stage.residence());
+    stage.app.world_mut().despawn(head);
 }
 
 pub fn strands_are_wound_there_and_keep_their_curl(stage: &mut Stage) {

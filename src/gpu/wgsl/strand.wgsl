@@ -133,8 +133,8 @@ struct Substep {
 // SCRATCH a node. Before a substep the first two hold a node's kinematic target, and the frame of a root's; of no
 // meaning otherwise between substeps.
 @group(0) @binding(6) var<storage, read_write> scratch: array<vec4<f32>>;
-// Strands put back, rebuilt, and of the first of them the number from the end; from the 16th on whether a strand
-// was not still.
+// Strands put back, rebuilt, of the first of them the number from the end, and whether one with held nodes has to
+// give way; from the 16th on whether a strand was not still.
 @group(0) @binding(7) var<storage, read_write> report: array<atomic<u32>, 20>;
 @group(1) @binding(0) var<uniform> record: Substep;
 

@@ -137,6 +137,23 @@ fn put_back() {
     set_moving(edges, vec3(0.0), 0.0);
 }
 
+// Says whether a strand with held nodes is strained so much that it has to give way, as it does on the CPU.
+fn watch_held(most: f32) {
+    if (record.flags & HOLDS) == 0u {
+        return;
+    }
+    var holds = false;
+    var is_strained = false;
+    for (var i = 1u; i <= edges; i++) {
+        holds |= is_held(edge(i).z);
+        let l = edge(i - 1u).x;
+        is_strained |= abs(distance(node(i).xyz, node(i - 1u).xyz) - l) > most * l;
+    }
+    if holds && is_strained {
+        atomicStore(&report[3], 1u);
+    }
+}
+
 // Whether the whole hair sleeps.
 fn sleeps() -> bool {
     return (record.flags & WAKES) == 0u && atomicLoad(&report[record.restless_before]) == 0u;
@@ -180,6 +197,7 @@ fn substep(
         put_back();
         return;
     }
+    watch_held(MOST_STRAIN);
     if (record.flags & REMEMBERS) != 0u {
         remember();
     }
@@ -218,6 +236,7 @@ fn sweep(
         rest_spins();
         return;
     }
+    watch_held(MOST_SWEPT_STRAIN);
     if (record.flags & REMEMBERS) != 0u {
         remember();
     }

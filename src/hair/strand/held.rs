@@ -11,7 +11,7 @@ use bevy::{math::Isometry3d, prelude::*};
 /// mass 0 and move to their targets as far as the strand reaches by the way that colliders leave free: where an edge
 /// would be stretched or crushed by more than 4 % (with [`Sweeps`](crate::SolverMethod::Sweeps) 5 %, of springs 50 %) they
 /// give way. A target out of reach is reported once as a fault of kind [`FaultKind::Strand`]. Add it to a strand entity.
-/// Hair on the graphics card gives way to its own length only, not to colliders.
+/// Hair on the graphics card that has to give way goes on on the processor.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 #[require(HeldNodesState)]
@@ -45,6 +45,12 @@ pub struct HeldNodesState {
 }
 
 impl HeldNodesState {
+    /// Whether it could not follow its targets lately.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn gives_way(&self) -> bool {
+        self.pace.is_some()
+    }
+
     pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
         tape.flags([&mut self.out_of_reach, &mut self.is_led]);
         tape.option(&mut self.pace, Tape::value);

@@ -21,4 +21,6 @@ mod springs;
 mod substeps;
 
 pub use rods::RodPlugin;
+#[cfg(feature = "gpu")]
+pub(crate) use rods::{MOST_STRAIN, MOST_SWEPT_STRAIN};
 pub use springs::SpringPlugin;

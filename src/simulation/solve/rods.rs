@@ -35,8 +35,10 @@ use crate::{
 use bevy::{math::Isometry3d, prelude::*};
 use fearless_simd::Level;
 
-/// Strain by which solids jam hair whose lengths the direct method keeps to a thousandth otherwise.
-const MOST_STRAIN: f32 = 0.04;
+/// Strain by which solids jam hair whose lengths the direct method keeps to a thousandth otherwise, and more than sweeps
+/// leave.
+pub(crate) const MOST_STRAIN: f32 = 0.04;
+pub(crate) const MOST_SWEPT_STRAIN: f32 = 0.05;
 
 /// Cosserat rods: the elastic projection.
 #[derive(Clone, Copy, Debug, Default)]
@@ -111,7 +113,7 @@ impl<'a> Batched for RodColumns<'a> {
     fn most_strain(params: &HairParams<'_>) -> f32 {
         match params.method {
             Method::Direct(_) => MOST_STRAIN,
-            Method::Sweeps(..) => 0.05,
+            Method::Sweeps(..) => MOST_SWEPT_STRAIN,
         }
     }
 
