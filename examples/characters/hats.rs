@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_keratin::prelude::*;
 
-/// What H shows and hides; some hold hair while they are shown.
+/// What H shows and hides. A character's own holds its hair by itself while it is shown, one that is made by a collider.
 #[derive(Component, Default)]
 pub struct Hat(Option<HairCollider>);
 
@@ -31,21 +31,22 @@ pub fn bring_hat(
     for hat in &own {
         commands.entity(*hat).insert((Hat::default(), Visibility::Hidden));
     }
+    if !own.is_empty() {
+        return Ok(());
+    }
     // Hair has the head's size, its middle at the origin.
     let (hair, on) = hairs.get(worn.hair)?;
     let inside = HairCollider::inside(Vec3::new(0.105, 0.13, 0.125), 0.04)?;
     let hat = commands.spawn((Hat(Some(inside)), *hair, Visibility::Hidden, ChildOf(on.parent())));
     let hat = hat.id();
-    if own.is_empty() {
-        let felt = materials.add(StandardMaterial {
-            perceptual_roughness: 0.9,
-            ..Color::srgb(0.12, 0.16, 0.24).into()
-        });
-        let at = |y: f32| Transform::from_xyz(0.0, y, 0.0).with_scale(Vec3::new(1.0, 1.0, 1.2));
-        for (radius, height, y) in [(0.16, 0.006, 0.04), (0.105, 0.1, 0.09)] {
-            let part = Mesh3d(meshes.add(Cylinder::new(radius, height)));
-            commands.spawn((part, MeshMaterial3d(felt.clone()), at(y), ChildOf(hat)));
-        }
+    let felt = materials.add(StandardMaterial {
+        perceptual_roughness: 0.9,
+        ..Color::srgb(0.12, 0.16, 0.24).into()
+    });
+    let at = |y: f32| Transform::from_xyz(0.0, y, 0.0).with_scale(Vec3::new(1.0, 1.0, 1.2));
+    for (radius, height, y) in [(0.16, 0.006, 0.04), (0.105, 0.1, 0.09)] {
+        let part = Mesh3d(meshes.add(Cylinder::new(radius, height)));
+        commands.spawn((part, MeshMaterial3d(felt.clone()), at(y), ChildOf(hat)));
     }
     Ok(())
 }

@@ -31,7 +31,7 @@ const ROOT: f32 = 5e-3;
 pub struct DrawnSolid {
     /// The axes, by which a point's coordinates are found, and where they begin.
     axes: [Vec4; 3],
-    /// Half the segment's length; of a hat [`HOLDS`] or [`KEEPS_OUT`].
+    /// Half the segment's length; of a hat [`HOLDS`], [`KEEPS_OUT`] or [`HIDES`].
     half: f32,
     /// The clearance.
     room: f32,
@@ -41,9 +41,11 @@ pub struct DrawnSolid {
     rim: f32,
 }
 
-/// [`DrawnSolid::half`] of a hat that strands stay under, and of one that they stay outside of.
+/// [`DrawnSolid::half`] of a hat that strands stay under, of one that they stay outside of, and of one above whose rim
+/// they are not drawn.
 const HOLDS: f32 = -1.0;
 const KEEPS_OUT: f32 = -2.0;
+const HIDES: f32 = -3.0;
 
 impl DrawnSolid {
     /// What `shape` fills at this place in the hair's frame; of a hat whether it `holds` the hair. `None` if that is no
@@ -65,14 +67,19 @@ impl DrawnSolid {
         let scale = place.matrix3.determinant().abs().cbrt();
         let (mut half, room) = (half_length / radii.y, CLEARANCE / (radii.min_element() * scale));
         let mut rim = 0.0;
-        if let ColliderShape::Hat { rim: height, .. } = shape {
-            (half, rim) = (if holds { HOLDS } else { KEEPS_OUT }, height / radii.y);
+        if let ColliderShape::Hat { rim: height, hides, .. } = shape {
+            half = match (holds, hides) {
+                (false, _) => KEEPS_OUT,
+                (true, false) => HOLDS,
+                (true, true) => HIDES,
+            };
+            rim = height / radii.y;
         }
         let m = place.matrix3;
         let longest = [m.x_axis, m.y_axis, m.z_axis].map(|axis| axis.length()).into_iter();
         let longest = longest.fold(0.0, f32::max);
         // The clearance is a share of the radii.
-        let around = if half == HOLDS { UNDER_HAT } else { 1.0 + room.max(0.0) };
+        let around = if holds && half < 0.0 { UNDER_HAT } else { 1.0 + room.max(0.0) };
         let reach = (radii.max_element() + half_length) * longest * around;
         let is_usable = axes.iter().all(|row| row.is_finite() && row.truncate() != Vec3::ZERO)
             && [half, room, reach, rim].into_iter().all(f32::is_finite);
@@ -103,7 +110,7 @@ impl DrawnSolid {
         let apart = own.length();
         let mut out = own / apart.max(1e-6);
         let mut missing = 1.0 + self.room - apart;
-        if self.half < 0.0 && above <= 0.0 {
+        if self.half < 0.0 && (above <= 0.0 || self.half == HIDES) {
             return false;
         }
         if self.half == HOLDS {

@@ -98,7 +98,7 @@ struct DrawnSolid {
     x: vec4<f32>,          // the frame's axes, by which a place's coordinates are found
     y: vec4<f32>,
     z: vec4<f32>,
-    half: f32,             // of the segment's length; HOLDS of a hat that strands stay under, less of another
+    half: f32,             // of the segment's length; of a hat HOLDS, HIDES or less than 0
     room: f32,             // how far outside strands stay
     reach: f32,            // of a ball around it, with that room (m)
     rim: f32,              // of a hat: it is above this along Y
@@ -333,7 +333,9 @@ const GROUP: u32 = 8u;
 // How many times a point goes through all solids, at most: what one pushes out may come to lie in an
 // earlier one.
 const SWEEPS: u32 = 3u;
+// Of a hat that strands stay under, and of one above whose rim they are not drawn.
 const HOLDS: f32 = -1.0;
+const HIDES: f32 = -3.0;
 
 // Moves a point of a strand out of a solid if it is inside, and turns its slope along the surface.
 fn push_out(solid: DrawnSolid, point: ptr<function, StrandPoint>) -> u32 {
@@ -346,6 +348,10 @@ fn push_out(solid: DrawnSolid, point: ptr<function, StrandPoint>) -> u32 {
     var out = own / max(apart, 1e-6);
     var missing = 1.0 + solid.room - apart;
     if solid.half < 0.0 && above <= 0.0 {
+        return 0u;
+    }
+    if solid.half == HIDES {
+        (*point).weights = vec3(0.0);
         return 0u;
     }
     if solid.half == HOLDS {

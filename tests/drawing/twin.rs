@@ -289,13 +289,22 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
         DrawnSolid::new(&capsule, &place, false).unwrap(),
     ];
     let hat = |at: Vec3, turn: f32, size: f32, holds: bool| {
-        let shape = ColliderShape::Hat { radii: size * Vec3::new(1.0, 1.2, 1.1), rim: 0.3 * size };
+        let shape = ColliderShape::Hat {
+            radii: size * Vec3::new(1.0, 1.2, 1.1),
+            rim: 0.3 * size,
+            hides: false,
+        };
         let place = Affine3A::from_rotation_translation(Quat::from_rotation_x(turn), at);
         DrawnSolid::new(&shape, &place, holds).unwrap()
     };
     let hats =
         [hat(Vec3::Y * 0.01, 0.2, 0.1, true), hat(Vec3::new(0.0, -0.1, 0.05), -0.5, 0.05, false)];
     solids.extend(hats);
+    // And one that hides what is above its rim.
+    let helmet = Affine3A::from_rotation_translation(Quat::from_rotation_x(0.4), Vec3::Y * -0.07);
+    let shape = ColliderShape::Hat { radii: Vec3::splat(0.1), rim: 0.02, hides: true };
+    solids.push(DrawnSolid::new(&shape, &helmet, true).unwrap());
+    let above_rim = |p: Vec3| helmet.inverse().transform_point3(p).y - 0.02;
     solids.extend((0..60).map(|_| DrawnSolid::ball(0.08 * random.vector(), 0.012).unwrap()));
     arrange(&mut solids);
     let frame = packed_frame(&solids);
@@ -324,7 +333,7 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
     let dry = |k: u32| Guide { moisture: &[], ..now(k) };
     let parted = HairFollowers { parting: 1e6, ..followers };
     let [mut worst, mut worst_past, mut worst_ring] = [0.0f32; 3];
-    let [mut parts, mut drawn_in, mut pushed, mut cut, mut hatted] = [0; 5];
+    let [mut parts, mut drawn_in, mut pushed, mut cut, mut hatted, mut hidden] = [0; 6];
     let bare: Vec<DrawnSolid> =
         solids.iter().filter(|solid| !hats.contains(solid)).copied().collect();
     for (k, strand) in strands.iter().enumerate() {
@@ -334,6 +343,14 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
             let at = 6 * (k * SAMPLES + i);
             worst = worst.max(vector(at).distance(twin.position));
             worst = worst.max(vector(at + 1).distance(twin.slope) * 0.01);
+            // What pushes a point may take it across the rim.
+            let above = above_rim(twin.position);
+            if out[4 * at + 15] == 0.0 {
+                assert!(above > -0.025, "hidden {above} m above the rim");
+                hidden += 1;
+                continue;
+            }
+            assert!(above < 0.025, "drawn {above} m above the rim");
             // A ring is as exact as its halves and sixteen bits of an octahedron are.
             assert!(vector(at + 3) == vector(at) && out[4 * at + 15] == 1.0);
             worst_ring =
@@ -354,11 +371,14 @@ pub fn the_shader_puts_strands_where_its_rust_twin_does() {
     println!("largest difference {worst} m, in the frame before {worst_past} m");
     println!("rings lose {worst_ring}");
     println!(
-        "{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out, {hatted} by hats, {cut} cut"
+        "{parts} points of parted guides, {drawn_in} drawn in by water, {pushed} pushed out, {hatted} by hats, {cut} cut, {hidden} hidden"
     );
     assert!(worst < 1e-5 && worst_past < 1e-5, "shader and twin differ by {worst}, {worst_past} m");
     assert!((1e-6..1e-3).contains(&worst_ring), "packing a ring loses {worst_ring}");
-    assert!(parts.min(drawn_in).min(hatted).min(cut) > 100, "the data must contain all kinds");
+    assert!(
+        parts.min(drawn_in).min(hatted).min(cut).min(hidden) > 100,
+        "the data must contain all kinds"
+    );
 }
 
 const FIBRE: &str = "

@@ -400,6 +400,76 @@ fn a_cape_holds_hair_on_its_outside() {
     assert_eq!(colliders(Some(Visibility::Hidden)).2, usual);
 }
 
+/// A helmet as an exporter leaves it, a mesh of the head that may be hidden, holds hair while it is shown.
+#[cfg(feature = "render")]
+#[test]
+fn a_helmet_holds_hair_while_it_is_shown() {
+    let wear = |name: &str, shown: Visibility, is_rigid: bool| {
+        let mut app = app();
+        let root = app.world_mut().spawn(Transform::default()).id();
+        let (_, body) = character(&mut app, root, 1.0);
+        let helmet = on_head(&mut app, body, name, HALF * 1.1);
+        edit(&mut app, helmet, |mesh| keep(mesh, |p| p.y > MIDDLE.y));
+        if is_rigid {
+            app.update();
+            let head = app.world().get::<SkinnedMesh>(helmet).unwrap().joints[3];
+            let at = app.world().get::<GlobalTransform>(head).unwrap().affine().inverse();
+            let at = Transform::from_matrix(Mat4::from(at));
+            app.world_mut().entity_mut(helmet).remove::<SkinnedMesh>().insert((at, ChildOf(head)));
+        }
+        app.world_mut().entity_mut(helmet).insert(shown);
+        app.world_mut().entity_mut(root).insert(WearHair::new(HairPreset::Curly));
+        let hair = worn(&mut app);
+        (app, root, helmet, hair)
+    };
+    let hats = |app: &mut App| {
+        let mut all = app.world_mut().query::<&HairCollider>();
+        let hats = all.iter(app.world()).filter_map(|of| match of.shape {
+            ColliderShape::Hat { hides, .. } => Some(hides),
+            _ => None,
+        });
+        hats.collect::<Vec<_>>()
+    };
+    // The largest share of an ellipsoid around the head that a node above the rim is at.
+    let farthest = |app: &mut App, hair: Entity, root: Entity| {
+        (0..90).for_each(|_| app.update());
+        let to_root = place_in(app, hair, root);
+        let nodes = strands(app, hair).into_iter().flat_map(|s| s.positions().to_vec());
+        let above = nodes.map(|p| to_root.transform_point3(p)).filter(|p| p.y > MIDDLE.y + 0.02);
+        above.map(|p| ((p - MIDDLE) / HALF).length()).fold(0.0, f32::max)
+    };
+    for is_rigid in [false, true] {
+        let (mut app, root, helmet, hair) = wear("Knight_Helmet", Visibility::Hidden, is_rigid);
+        assert!(hats(&mut app).is_empty());
+        let free = farthest(&mut app, hair, root);
+        app.world_mut().entity_mut(helmet).insert(Visibility::Inherited);
+        let held = farthest(&mut app, hair, root);
+        assert_eq!(hats(&mut app), [true], "it holds and hides");
+        app.world_mut().entity_mut(helmet).insert(Visibility::Hidden);
+        let again = farthest(&mut app, hair, root);
+        assert!(hats(&mut app).is_empty());
+        println!("hair reaches {free} of the head, {held} under the helmet, {again} after it");
+        assert!(free > 1.28 && held < 1.12 && again > 1.28, "{free}, {held}, {again}");
+        assert!(faults(&mut app).is_empty());
+        // It goes with its mesh, and with the hair.
+        app.world_mut().entity_mut(helmet).insert(Visibility::Inherited);
+        (0..2).for_each(|_| app.update());
+        app.world_mut().despawn(helmet);
+        (0..2).for_each(|_| app.update());
+        assert!(hats(&mut app).is_empty());
+    }
+    let (mut app, root, ..) = wear("Hat", Visibility::Inherited, false);
+    (0..2).for_each(|_| app.update());
+    assert_eq!(hats(&mut app), [true]);
+    app.world_mut().entity_mut(root).remove::<WearHair>();
+    (0..2).for_each(|_| app.update());
+    assert!(hats(&mut app).is_empty());
+    // What is no hat by its name may be old hair.
+    let (mut app, ..) = wear("Mesh_7", Visibility::Inherited, false);
+    (0..2).for_each(|_| app.update());
+    assert!(hats(&mut app).is_empty());
+}
+
 /// A joint moves the lower half of what would be a limb, another the flat shoulder over it.
 #[test]
 fn no_collider_stands_far_out_of_the_skin() {

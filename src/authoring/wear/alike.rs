@@ -75,8 +75,8 @@ impl PartLikeness {
 
 impl Likeness {
     fn of(input: &MakeInput) -> Self {
-        let Target { head, parts, garments, own, size, .. } = &input.target;
-        let all = || parts.iter().chain(garments);
+        let Target { head, parts, garments, hats, own, size, .. } = &input.target;
+        let all = || parts.iter().chain(garments).chain(hats);
         let joints = |part: &MeshPart| part.skin.iter().flat_map(|s| s.joints.clone()).collect();
         let of_parts = all().flat_map(|part| {
             let joints: Vec<Entity> = joints(part);
@@ -85,7 +85,7 @@ impl Likeness {
         let entities = core::iter::once(*head).chain(of_parts);
         let marked = |at: Entity| (at, [own.above.contains(&at), own.joints.contains(&at)]);
         let kinds = parts.iter().map(|part| (part, false));
-        let kinds = kinds.chain(garments.iter().map(|part| (part, true)));
+        let kinds = kinds.chain(garments.iter().chain(hats).map(|part| (part, true)));
         let solid = |s: &OwnSolid| (s.collider.clone(), s.joint, s.place);
         Self {
             wear: input.wear.bare(),

@@ -6,6 +6,7 @@ use super::{
     facing::FacingFrom,
     fall::Fall,
     garments::{garments, is_sheet},
+    helmets::{Helmet, helmets},
     part::{HEAD_WEIGHT, MeshPart, positions},
     skin::{Hint, Role},
     space::{Fitting, cropped, fit},
@@ -172,7 +173,9 @@ impl Made {
     pub(super) fn give_to(&mut self, entities: &EntityHashMap<Entity>) {
         let skin = self.skin.iter_mut().map(|(mesh, _)| mesh);
         let joints = self.solids.capsules.iter_mut().map(|(joint, _)| joint);
-        let all = core::iter::once(&mut self.parent).chain(skin).chain(joints);
+        let helmets = self.solids.helmets.iter_mut();
+        let of_helmets = helmets.flat_map(|(on, (helmet, _))| [on, &mut helmet.mesh]);
+        let all = core::iter::once(&mut self.parent).chain(skin).chain(joints).chain(of_helmets);
         #[cfg(feature = "render")]
         let all = all.chain(
             (self.hairs.iter_mut().flatten())
@@ -193,6 +196,8 @@ pub(super) struct Solids {
     pub(super) balls: Vec<(HairCollider, Transform)>,
     /// Of joints.
     pub(super) capsules: Vec<(Entity, (HairCollider, Transform))>,
+    /// Of what they move with.
+    pub(super) helmets: Vec<(Entity, (Helmet, Transform))>,
 }
 
 impl Solids {
@@ -278,7 +283,8 @@ fn fit_solids(
     let mut capsules = capsules(&limbs, &target.own.joints, fitting, reach);
     let worn = capes.chain(&target.garments);
     capsules.extend(garments(worn, &target.own.joints, fitting, &roots, reach));
-    Ok(Solids { balls, capsules })
+    let helmets = helmets(target, fitting, &roots);
+    Ok(Solids { balls, capsules, helmets })
 }
 
 /// Makes the hairs of a wear, which settle as long as they are `wanted`.

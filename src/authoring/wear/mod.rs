@@ -19,6 +19,7 @@
 //! | how hair lies that takes the place of other | `fall` |
 //! | making it once for all who get the same | `alike` |
 //! | colliders for capes and collars | `garments` |
+//! | hats for hats and helmets | `helmets` |
 //! | which asset is to blame for a missing mesh | `missing` |
 //! | hiding the hair that a character came with | `old_hair` |
 //! | shading the skin under the hair | `shade`, `shell` |
@@ -29,6 +30,7 @@ mod facing;
 mod fall;
 mod garments;
 mod head;
+mod helmets;
 mod landmarks;
 mod make;
 mod missing;
@@ -96,6 +98,7 @@ impl Plugin for WearPlugin {
                     systems::start,
                     systems::put_on,
                     systems::fit_again,
+                    helmets::wear_helmets,
                 )
                     .chain()
                     .before(PassedOn),

@@ -74,7 +74,7 @@ pub(super) struct Shell {
 }
 
 /// Points all over the triangles, the same for the same triangles.
-fn points(triangles: &[[Vec3; 3]]) -> Vec<(Vec3, f32)> {
+pub(super) fn points(triangles: &[[Vec3; 3]]) -> Vec<(Vec3, f32)> {
     let area = |[a, b, c]: &[Vec3; 3]| 0.5 * (*b - *a).cross(*c - *a).length();
     let areas: Vec<f32> = triangles.iter().map(area).collect();
     let all: f32 = areas.iter().sum();
@@ -93,7 +93,7 @@ fn points(triangles: &[[Vec3; 3]]) -> Vec<(Vec3, f32)> {
 }
 
 /// How far out a mesh reaches in each cell; 0 where it does not.
-fn reach(points: &[(Vec3, f32)], middle: Vec3) -> Vec<f32> {
+pub(super) fn reach(points: &[(Vec3, f32)], middle: Vec3) -> Vec<f32> {
     let mut reach = vec![0.0_f32; CELLS];
     for (p, _) in points {
         let off = *p - middle;
@@ -106,7 +106,7 @@ fn reach(points: &[(Vec3, f32)], middle: Vec3) -> Vec<f32> {
     reach
 }
 
-fn cell(way: Vec3) -> usize {
+pub(super) fn cell(way: Vec3) -> usize {
     let row = ((way.y * 0.5 + 0.5) * ROWS as f32) as usize;
     let column = ((atan2(way.z, way.x) / TAU + 0.5) * COLUMNS as f32) as usize;
     row.min(ROWS - 1) * COLUMNS + column.min(COLUMNS - 1)

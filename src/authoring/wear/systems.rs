@@ -703,6 +703,9 @@ fn spawn_solids(commands: &mut Commands, wearer: Entity, hair: Entity, solids: S
     for (joint, capsule) in solids.capsules {
         commands.spawn((capsule, is, ChildOf(joint)));
     }
+    for (on, helmet) in solids.helmets {
+        commands.spawn((helmet, is, ChildOf(on)));
+    }
 }
 
 /// Fits the colliders of worn hair again when its meshes have changed; one fit at a time.
@@ -746,6 +749,7 @@ pub(super) fn fit_again(
                 commands.entity(collider).try_despawn();
             }
             solids.capsules.retain(|(joint, _)| joints.contains(*joint));
+            solids.helmets.retain(|(on, _)| joints.contains(*on));
             spawn_solids(&mut commands, wearer, first, solids);
         }
         if is_ready {

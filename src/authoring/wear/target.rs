@@ -6,6 +6,7 @@ use super::{
     error::WearError,
     head::{is_head, is_head_of_rigify},
     part::{Cue, MeshPart, MeshSkin, skin_of},
+    skin::Hint,
     space::bound_to,
     what::WearHair,
 };
@@ -38,6 +39,8 @@ pub(super) struct Target {
     pub(super) parts: Vec<MeshPart>,
     /// What is shown and moves with other bones than the head's, and not with its skin: capes, pauldrons.
     pub(super) garments: Vec<MeshPart>,
+    /// What hangs on the head's bones without a skin and is called a hat, shown or not.
+    pub(super) hats: Vec<MeshPart>,
     pub(super) own: OwnColliders,
     /// How the wearer is turned in the world, and how many metres one of its own is there.
     pub(super) turn: Quat,
@@ -271,9 +274,16 @@ impl Characters<'_, '_> {
             part.is_shown.then_some(part)
         });
         let garments = garments.collect();
+        let hangs = |s: &&(Entity, &Mesh3d, Option<&SkinnedMesh>)| {
+            is_bone && s.2.is_none() && of_head.contains(&s.0)
+        };
+        let hanging = skinned.iter().filter(hangs);
+        let hanging = hanging.filter_map(|s| self.rigid(s, wearer, &joints, &parts));
+        let hats = hanging.filter(|part| Hint::of(&part.name) == Hint::Worn);
+        let hats = hats.map(|part| MeshPart { skin: None, ..part }).collect();
         let own = self.own_colliders(wearer, &joints);
         let (turn, size) = self.stands(wearer);
-        Ok(Target { head, garments, parts, own, turn, size })
+        Ok(Target { head, garments, hats, parts, own, turn, size })
     }
 
     /// How an entity is turned in the world, and how large it is.
@@ -353,7 +363,7 @@ impl Characters<'_, '_> {
     /// Whether a mesh is drawn, as far as that is decided below the wearer. What is hidden for worn hair counts as
     /// shown.
     #[cfg(feature = "render")]
-    fn is_shown(&self, mesh: Entity, wearer: Entity) -> bool {
+    pub(super) fn is_shown(&self, mesh: Entity, wearer: Entity) -> bool {
         let below = self.upward(mesh).take_while(|at| *at != wearer);
         let each = below.filter_map(|at| self.shown.get(at).ok());
         let decided = each.map(|(is, for_hair)| match is {
@@ -365,7 +375,7 @@ impl Characters<'_, '_> {
     }
 
     #[cfg(not(feature = "render"))]
-    fn is_shown(&self, _: Entity, _: Entity) -> bool {
+    pub(super) fn is_shown(&self, _: Entity, _: Entity) -> bool {
         true
     }
 

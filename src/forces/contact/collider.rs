@@ -74,6 +74,8 @@ pub enum ColliderShape {
         radii: Vec3,
         /// Where the rim is along Y (m): below it is no hat.
         rim: f32,
+        /// Whether hair of its wearer is not drawn above the rim.
+        hides: bool,
     },
 }
 
@@ -215,8 +217,17 @@ impl HairCollider {
     /// # Errors
     /// As [`ellipsoid`](Self::ellipsoid), and when the rim's height is not finite or beyond 100 km.
     pub fn inside(radii: Vec3, rim: f32) -> Result<Self, InvalidValue> {
-        let hat = Self { friction: 0.0, ..Self::from(ColliderShape::Hat { radii, rim }) };
-        hat.checked()
+        let hat = ColliderShape::Hat { radii, rim, hides: false };
+        Self { friction: 0.0, ..Self::from(hat) }.checked()
+    }
+
+    /// The same hat, above whose rim hair of its wearer is not drawn: for helmets, whose walls are no ellipsoids. Does
+    /// nothing to other shapes.
+    pub fn hiding(mut self) -> Self {
+        if let ColliderShape::Hat { hides, .. } = &mut self.shape {
+            *hides = true;
+        }
+        self
     }
 
     /// The convex hull of points (m): [`ConvexHull::new`].
@@ -276,8 +287,8 @@ impl Stretched for HairCollider {
         let shape = match self.shape {
             ColliderShape::Sphere(s) => ColliderShape::Ellipsoid { radii: s.radius * by },
             ColliderShape::Ellipsoid { radii } => ColliderShape::Ellipsoid { radii: radii * by },
-            ColliderShape::Hat { radii, rim } => {
-                ColliderShape::Hat { radii: radii * by, rim: rim * by.y }
+            ColliderShape::Hat { radii, rim, hides } => {
+                ColliderShape::Hat { radii: radii * by, rim: rim * by.y, hides }
             }
             ColliderShape::Capsule(Capsule3d { radius, half_length }) => {
                 let end = (radius + half_length) * by.y;

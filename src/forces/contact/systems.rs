@@ -193,7 +193,7 @@ pub(crate) fn seen_from(hair: &TickPose, collider: &HairCollider, pose: &TickPos
             placed(Shape::Cuboid { half: cuboid.half_size, rounding: *rounding })
         }
         ColliderShape::Ellipsoid { radii } => placed(Shape::Ellipsoid { radii: *radii }),
-        ColliderShape::Hat { radii, rim } => {
+        ColliderShape::Hat { radii, rim, .. } => {
             placed(Shape::Hat { radii: *radii, rim: *rim, holds: false })
         }
         ColliderShape::Hull(hull) => placed(Shape::Hull(hull.clone())),
