@@ -9,7 +9,10 @@ use super::{
     space::bound_to,
     what::WearHair,
 };
-use crate::{forces::contact::HairCollider, hair::strand::Hair};
+use crate::{
+    forces::contact::{ColliderShape, HairCollider},
+    hair::strand::Hair,
+};
 use bevy::{
     asset::LoadState,
     ecs::system::SystemParam,
@@ -369,23 +372,25 @@ impl Characters<'_, '_> {
         true
     }
 
-    /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own.
+    /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own. A hat
+    /// is in the place of none.
     fn own_colliders(&self, wearer: Entity, joints: &HashSet<Entity>) -> OwnColliders {
         let mut own = OwnColliders::default();
         for (at, collider) in &self.colliders {
             let (mut joint, mut is_below) = (None, false);
+            let is_hat = matches!(collider.shape, ColliderShape::Hat { .. });
             for entity in self.upward(at) {
-                own.above.insert(entity);
-                if joint.is_none() && joints.contains(&entity) {
-                    joint = Some(entity);
-                    own.joints.insert(entity);
+                if !is_hat {
+                    own.above.insert(entity);
                 }
+                joint = joint.or_else(|| joints.get(&entity).copied());
                 is_below |= entity == wearer;
                 let is_other = entity != wearer && self.wearers.contains(entity);
                 if is_other || self.hairs.contains(entity) {
                     break;
                 }
             }
+            own.joints.extend(joint.filter(|_| !is_hat));
             if let Some(place) = self.relative(at, joint.unwrap_or(wearer)).filter(|_| is_below) {
                 own.solids.push(OwnSolid { collider: collider.clone(), joint, place });
             }

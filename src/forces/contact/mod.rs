@@ -81,9 +81,7 @@ impl Obstacles {
     }
 
     pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
-        let count = tape.count(self.hats.len(), size_of::<f32>());
-        self.hats.resize(count, hat::WornHat::new(Entity::PLACEHOLDER));
-        self.hats.iter_mut().for_each(|hat| hat.record(tape));
+        hat::WornHat::record(&mut self.hats, tape);
     }
 }
 
