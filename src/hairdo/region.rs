@@ -19,7 +19,22 @@ pub enum StrandRegion {
     },
 }
 
+/// Why a plane through a point with a normal is none.
+pub(super) fn wrong_plane(point: Vec3, normal: Vec3) -> Option<String> {
+    let is_plane = point.is_finite() && normal.is_finite() && normal != Vec3::ZERO;
+    let expected = "expected finite numbers and a normal that is not zero";
+    (!is_plane).then(|| format!("a plane through {point} with the normal {normal}, {expected}"))
+}
+
 impl StrandRegion {
+    /// Why there is no such region.
+    pub(super) fn wrong(&self) -> Option<String> {
+        match *self {
+            Self::All => None,
+            Self::Above { point, normal } => wrong_plane(point, normal),
+        }
+    }
+
     /// Whether a strand with its root here belongs to it.
     pub fn contains(&self, root: Vec3) -> bool {
         match self {

@@ -105,6 +105,62 @@ fn a_slider_that_is_dragged_shows_its_values() {
     assert_eq!(faults(&mut app), []);
 }
 
+/// Hair of another length is there at once, and settles unseen: what is put on it or done to it meanwhile stays.
+#[test]
+fn what_is_done_to_hair_in_a_pause_stays() {
+    let mut app = app();
+    let (root, _) = dressed(&mut app, WearHair::new(HairPreset::Short));
+    app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    wear(&mut app, root).length = 1.4;
+    let hair = worn(&mut app);
+    app.world_mut().entity_mut(hair).insert(AirDrag { rate: 7.0 });
+    let (start, at_first) = (Instant::now(), nodes(&mut app, hair));
+    wait_for(&mut app, |app| (nodes(app, hair) != at_first).then_some(()));
+    let took = start.elapsed();
+    assert_eq!(drawn(&app, root), [hair]);
+    assert_eq!(app.world().get::<AirDrag>(hair), Some(&AirDrag { rate: 7.0 }));
+    wear(&mut app, root).length = 1.2;
+    let hair = worn(&mut app);
+    app.world_mut().trigger(CutHair::all(root, CutBy::Length(0.02)));
+    app.world_mut().flush();
+    let start = Instant::now();
+    while start.elapsed() < 2 * took + Duration::from_millis(200) {
+        app.update();
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert_eq!(drawn(&app, root), [hair]);
+    let longest = strands(&mut app, hair).iter().map(Strand::length).fold(0.0, f32::max);
+    assert!(longest < 0.0201, "{longest} m in {took:?}");
+    assert_eq!(faults(&mut app), []);
+}
+
+/// A hat is no head: that has its colliders under it, when the hat is taken off again, too.
+#[test]
+fn hair_is_changed_under_a_hat() {
+    let mut app = app();
+    let root = app.world_mut().spawn((Transform::default(), WearHair::new(HairPreset::Short))).id();
+    let (head, _) = character(&mut app, root, 1.0);
+    worn(&mut app);
+    let colliders =
+        |app: &mut App| app.world_mut().query::<&HairCollider>().iter(app.world()).count();
+    let bare = colliders(&mut app);
+    let hat = HairCollider::inside(Vec3::new(0.11, 0.13, 0.12), 0.03).unwrap();
+    let hat = app.world_mut().spawn((hat, ChildOf(head))).id();
+    wear(&mut app, root).seed = 1;
+    let hair = worn(&mut app);
+    assert!(colliders(&mut app).abs_diff(bare + 1) < 4, "{} of {bare}", colliders(&mut app));
+    let deepest = |app: &mut App| {
+        let near = nodes(app, hair).into_iter().map(Vec3::length).fold(f32::MAX, f32::min);
+        (0..60).for_each(|_| app.update());
+        let then = nodes(app, hair).into_iter().map(Vec3::length).fold(f32::MAX, f32::min);
+        near - then
+    };
+    assert!(deepest(&mut app) < 2e-3);
+    app.world_mut().despawn(hat);
+    assert!(deepest(&mut app) < 2e-3);
+    assert_eq!(faults(&mut app), []);
+}
+
 #[test]
 fn stepping_through_presets_leaks_nothing() {
     let mut app = app();

@@ -161,6 +161,18 @@ fn a_length_leaves_what_is_shorter_and_the_least_is_a_millimetre() {
         let said = faults(&mut app);
         assert!(said.len() == 1 && said[0].message.contains("nothing is cut"), "{said:?}");
     }
+    for (point, normal) in [(Vec3::NAN, Vec3::Y), (Vec3::ZERO, Vec3::ZERO), (Vec3::ZERO, Vec3::NAN)]
+    {
+        let region = StrandRegion::Above { point, normal };
+        request(&mut app, CutHair { hair, by: CutBy::Length(0.01), region });
+        app.update();
+        let said = faults(&mut app);
+        assert!(
+            said.len() == 1 && said[0].message.contains("of a region above a plane"),
+            "{said:?}"
+        );
+    }
+    assert!(app.world().resource::<Answers>().0.is_empty());
     request(&mut app, CutHair::all(strands[0], LEVEL));
     app.update();
     assert_eq!(fault_kinds(&mut app), [FaultKind::NoTarget]);

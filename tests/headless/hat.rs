@@ -76,6 +76,16 @@ impl Scene {
         (hat, speed, strain)
     }
 
+    fn nodes(&self) -> Vec<Vec3> {
+        self.strands.iter().flat_map(|id| strand(&self.app, *id).positions().to_vec()).collect()
+    }
+
+    /// How far the first ten centimetres are above the head, in the mean (m).
+    fn height(&self) -> f32 {
+        let near = self.nodes().chunks(16).flat_map(|p| p[2..8].to_vec()).collect::<Vec<_>>();
+        near.iter().map(|p| p.length() - HEAD).sum::<f32>() / near.len() as f32
+    }
+
     /// Nodes above the rim: how many, and how far the farthest is outside of the hat (m, about).
     fn under(&self) -> (usize, f32) {
         let nodes = self.strands.iter().flat_map(|id| strand(&self.app, *id).positions());
@@ -83,6 +93,12 @@ impl Scene {
         let off = above.map(|p| ((*p / HAT).length() - 1.0) * HAT.x);
         off.fold((0, f32::NEG_INFINITY), |(count, most), off| (count + 1, most.max(off)))
     }
+}
+
+/// Root mean square distance (m).
+fn rms(a: &[Vec3], b: &[Vec3]) -> f32 {
+    let squares: f32 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
+    (squares / a.len() as f32).sqrt()
 }
 
 #[test]
@@ -106,9 +122,10 @@ fn hair_stays_under_a_hat_and_hangs_from_its_rim() {
         println!(
             "wet {wet}: {held} of {bare} nodes above the rim, {outside} m outside, {speed} m/s, strain {strain}"
         );
-        assert!(held > bare / 5, "{held} of {bare}");
+        // What lies along the head from the roots to the rim, of strands without stretch, is 143 nodes; some stand off.
+        assert!((150..=190).contains(&held), "{held} of {bare}");
         assert!(outside < 0.5e-3, "{outside} m outside of the hat");
-        assert!(speed < 6.0 && strain < 0.005, "{speed} m/s, {strain}");
+        assert!(speed < 5.0 && strain < 0.002, "{speed} m/s, {strain}");
         // Shaken by 10 cm at 2 Hz none leaves it.
         let (mut most, mut strain) = (f32::NEG_INFINITY, 0.0_f32);
         for tick in 0..90 {
@@ -141,10 +158,112 @@ fn a_hat_that_is_there_at_once_tears_nothing() {
     let (_, outside) = scene.under();
     println!("on end: {outside} m outside, {speed} m/s, strain {strain}");
     assert!(
-        strain < 0.005 && speed < 6.0 && outside < 0.5e-3,
+        strain < 0.002 && speed < 5.0 && outside < 0.5e-3,
         "{speed} m/s, {strain}, {outside} m"
     );
     assert_eq!(fault_kinds(&mut scene.app), []);
+}
+
+/// What is done to a scene, that hair should not be torn by: the largest speed (m/s) and strain of two seconds.
+fn worst(scene: &mut Scene) -> (f32, f32) {
+    let (mut speed, mut strain) = (0.0_f32, 0.0_f32);
+    for _ in 0..120 {
+        scene.app.update();
+        for id in &scene.strands {
+            let own = strand(&scene.app, *id);
+            speed = own.velocities().iter().map(|v| v.length()).fold(speed, f32::max);
+            strain = strain.max(own.peak_strain());
+        }
+    }
+    (speed, strain)
+}
+
+#[test]
+fn hats_are_swapped_and_stacked_and_taken_in_the_hand() {
+    let mut scene = Scene::hanging(On::Wearer, Transform::from_xyz(0.0, 1.6, 0.0));
+    run(&mut scene.app, 6.0);
+    assert_eq!(scene.app.world().get::<SleepCounts>(scene.hair).unwrap().awake, 0);
+    let free = scene.nodes();
+    // On hair that sleeps, and in one frame in the place of another.
+    let (first, ..) = scene.put_on();
+    assert!(scene.under().1 < 0.5e-3);
+    scene.app.world_mut().despawn(first);
+    let (inner, speed, strain) = scene.put_on();
+    println!("swapped: {speed} m/s, {strain}, {:?}", scene.under());
+    assert!(speed < 5.0 && strain < 0.005 && scene.under().1 < 0.5e-3);
+    let hat = |size: f32| HairCollider::inside(size * HAT, size * RIM).unwrap();
+    let outer = scene.app.world_mut().spawn((hat(1.1), ChildOf(scene.head))).id();
+    let (speed, strain) = worst(&mut scene);
+    println!("stacked: {speed} m/s, {strain}, {:?}", scene.under());
+    assert!(speed < 5.0 && strain < 0.005 && scene.under().1 < 0.5e-3);
+    scene.app.world_mut().despawn(inner);
+    worst(&mut scene);
+    // Outside of the inner one, but not of the outer one.
+    assert!((0.5e-3..0.0115).contains(&scene.under().1), "{:?}", scene.under());
+    // In the hand of the same character it holds nothing, on the way neither.
+    scene.app.world_mut().entity_mut(outer).insert(ChildOf(scene.character));
+    let mut most = 0.0_f32;
+    for tick in 0..60 {
+        let t = tick as f32 / 60.0;
+        let up = Vec3::new(0.4 * t * t, 0.5 * t * (1.0 - 1.4 * t), 0.0);
+        scene.app.world_mut().get_mut::<Transform>(outer).unwrap().translation = up;
+        scene.app.update();
+        let of = |id: &Entity| strand(&scene.app, *id).peak_strain();
+        most = scene.strands.iter().map(of).fold(most, f32::max);
+    }
+    run(&mut scene.app, 3.0);
+    let off = rms(&free, &scene.nodes());
+    println!("in the hand: strain {most} on the way, hair is {off} m off");
+    // What was under it is pressed as its wall goes by, at most as hair that is held.
+    assert!(most < 0.041 && off < 4e-3, "{most}, {off} m");
+    // Nor does one of a bird on the shoulder, or one too small for the head.
+    for (on, size, at) in [(scene.character, 0.3, Vec3::X * 0.2), (scene.head, 0.8, Vec3::ZERO)] {
+        let at = Transform::from_translation(at);
+        let small = scene.app.world_mut().spawn((hat(size), at, ChildOf(on))).id();
+        let (speed, strain) = worst(&mut scene);
+        let off = rms(&free, &scene.nodes());
+        println!("a hat of {size}: {speed} m/s, {strain}, hair is {off} m off");
+        assert!(strain < 0.005 && off < 4e-3, "{strain}, {off} m");
+        scene.app.world_mut().despawn(small);
+    }
+    assert_eq!(fault_kinds(&mut scene.app), []);
+}
+
+#[test]
+fn dry_hair_rises_when_a_hat_is_taken_off_and_what_dried_under_it_keeps_a_part_of_its_shape() {
+    let mut scene = Scene::hanging(On::Head, Transform::default());
+    let (free, before) = (scene.nodes(), scene.height());
+    let (hat, ..) = scene.put_on();
+    let under = scene.height();
+    scene.app.world_mut().despawn(hat);
+    run(&mut scene.app, 3.0);
+    let (after, off) = (scene.height(), rms(&free, &scene.nodes()));
+    println!(
+        "dry: {before} m above the head, {under} under the hat, {after} after it, {off} m off"
+    );
+    assert!(under < 0.6 * before && (after - before).abs() < 1e-4 && off < 3e-3, "{after}, {off}");
+    // Wet and dried, with a hat and without.
+    let [(bare, _), (after, under)] = [false, true].map(|with_hat| {
+        let mut scene = Scene::hanging(On::Head, Transform::default());
+        scene.app.world_mut().write_message(SoakHair { target: scene.hair, wetness: 1.0 });
+        run(&mut scene.app, 0.5);
+        let hat = with_hat.then(|| scene.put_on().0);
+        let under = scene.height();
+        scene.app.world_mut().resource_mut::<HairProcessTime>().0 = 4e4;
+        run(&mut scene.app, 1.5);
+        let water = |id: &Entity| scene.app.world().get::<Moisture>(*id).unwrap().volume();
+        assert!(scene.strands.iter().map(water).sum::<f64>() < 1e-12);
+        scene.app.world_mut().resource_mut::<HairProcessTime>().0 = 1.0;
+        if let Some(hat) = hat {
+            scene.app.world_mut().despawn(hat);
+        }
+        run(&mut scene.app, 3.0);
+        assert_eq!(fault_kinds(&mut scene.app), []);
+        (scene.height(), under)
+    });
+    let kept = (bare - after) / (bare - under);
+    println!("dried: {bare} m without a hat, {under} under one, {after} after it: keeps {kept}");
+    assert!((0.1..0.4).contains(&kept), "{kept}");
 }
 
 #[test]
@@ -228,5 +347,13 @@ fn a_hat_holds_hair_on_an_animated_head_until_it_sleeps() {
         assert!(most < 0.5e-3 && strain < 0.01, "{most} m outside, strain {strain}");
         // Those that are squeezed between hat and head tremble on, most by the papers' projections.
         assert!(counts.asleep >= [45, 15, 45][kind], "{counts:?}");
+        let before = scene.nodes();
+        scene.app.update();
+        let steps =
+            before.iter().zip(scene.nodes()).map(|(a, b)| a.distance(b)).collect::<Vec<_>>();
+        let tremble =
+            steps.chunks(16).filter(|nodes| nodes.iter().any(|step| *step > 1e-3)).count();
+        println!("{tremble} strands move by more than 1 mm in a tick");
+        assert!(tremble <= 8, "{tremble}");
     }
 }

@@ -185,6 +185,9 @@ fn a_region_is_tied_and_what_is_too_short_stays_free() {
     run(&mut worn.app, 0.1);
     let kinds = fault_kinds(&mut worn.app).into_iter().filter(|kind| *kind == FaultKind::NoTarget);
     assert_eq!(kinds.count(), 2);
+    worn.tie(StrandRegion::Above { point: Vec3::ZERO, normal: Vec3::NAN });
+    worn.app.update();
+    assert_eq!(fault_kinds(&mut worn.app), [FaultKind::Setting]);
 }
 
 #[cfg(feature = "save")]

@@ -49,7 +49,7 @@ pub(super) fn wear_helmets(
 }
 
 /// The hats of a character whose hair has these `roots` (m, in its space), each with what it moves with and its place
-/// there. Meshes that are, or are above, a collider of the game's own are left out.
+/// there. Meshes that have hats of the game's own are left out.
 pub(super) fn helmets(
     target: &Target,
     fitting: &Fitting,
@@ -59,7 +59,7 @@ pub(super) fn helmets(
     let others = target.parts.iter().enumerate().filter(|(i, _)| !is_skin(*i));
     let others = others.map(|(_, part)| part).filter(|part| Hint::of(&part.name) == Hint::Worn);
     let all = others.chain(&target.hats);
-    let free = all.filter(|part| !target.own.above.contains(&part.entity));
+    let free = all.filter(|part| !target.own.hats.contains(&part.entity));
     free.filter_map(|part| helmet(part, fitting, roots)).collect()
 }
 

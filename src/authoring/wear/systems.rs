@@ -25,7 +25,7 @@ use crate::{
         worn::{PassedTypes, Wearer, WornBy, WornHair},
     },
     hairdo::style::{HairStyle, KeptStyle},
-    simulation::settle::{SettleConditions, Settling},
+    simulation::settle::{SettleConditions, Settled, Settling},
     water::HairWetting,
 };
 use bevy::{
@@ -191,6 +191,7 @@ pub(super) fn detect_changes(
     time: Option<Res<Time<Virtual>>>,
     mut events: Option<MessageReader<AssetEvent<Groom>>>,
     mut hairs: Query<(&mut WornAs, &mut TiedRoots), With<Hair>>,
+    (members, strands): (Query<&Strands>, Query<Ref<Strand>>),
 ) {
     let changed: HashSet<_> = events
         .iter_mut()
@@ -201,11 +202,16 @@ pub(super) fn detect_changes(
         })
         .collect();
     let stands_still = time.is_some_and(|time| time.is_paused());
+    let is_written = |hair: Entity| {
+        let mut own = strands.iter_many(members.get(hair).into_iter().flat_map(Strands::iter));
+        own.any(|strand| strand.is_changed() && !strand.is_added())
+    };
     for (wear, mut wearing) in &mut wearers {
-        // In time that goes on, hair settles before the eyes.
+        // In time that goes on, hair settles before the eyes; what is cut or styled meanwhile stays as it is.
         for worn in &mut wearing.bypass_change_detection().worn {
-            worn.is_carried &= stands_still;
+            worn.is_carried = worn.is_carried && stands_still && !is_written(worn.hair);
         }
+        let is_carried = wearing.worn.iter().any(|worn| worn.is_carried);
         let mut is_other = wear.is_changed() && wearing.wanted.as_ref() != Some(&*wear);
         let is_same = || wearing.wanted.as_ref().is_some_and(|before| before.is_same_hair(&wear));
         let is_worn = !wearing.worn.is_empty() && matches!(wearing.stage, WearStage::Done);
@@ -218,7 +224,7 @@ pub(super) fn detect_changes(
             wearing.wanted = Some(WearHair::clone(&wear));
             is_other = false;
         }
-        if wearing.settles && (is_other || !stands_still) {
+        if wearing.settles && (is_other || !is_carried) {
             (wearing.stage, wearing.settles) = (WearStage::Done, false);
         }
         // A slider that is dragged: what is being made is shown before the next is begun.
@@ -246,12 +252,12 @@ pub(super) fn detect_changes(
             }
         }
         let is_reloaded = wear.sources().any(is_reloaded);
-        let is_to_settle = || wearing.worn.iter().any(|worn| worn.is_carried) && !wearing.settles;
+        let is_to_settle = is_carried && !wearing.settles;
         if is_reloaded && is_making {
             wearing.lags = true;
         } else if is_other || is_overdue || is_reloaded || has_lost_roots || (is_gone && is_done) {
             wearing.begin(&wear);
-        } else if is_done && wear.at.is_none() && is_to_settle() {
+        } else if is_done && wear.at.is_none() && is_to_settle {
             wearing.begin(&wear);
             wearing.settles = true;
         }
@@ -527,6 +533,16 @@ impl Hairdresser<'_, '_> {
         mut made: Made,
         kept: &[Option<Entity>],
     ) {
+        if core::mem::take(&mut wearing.settles) {
+            for (worn, new) in wearing.worn.iter_mut().zip(made.hairs) {
+                let Some(new) = new.filter(|_| worn.is_carried) else { continue };
+                (worn.fall, worn.is_carried) = (new.fall, false);
+                let (settled, hair) =
+                    (Settled { strands: new.strands, faults: new.faults }, worn.hair);
+                self.commands.queue(move |world: &mut World| settled.lay(world, hair));
+            }
+            return;
+        }
         log_made(wearer, &made);
         let before = core::mem::take(&mut wearing.worn);
         let gone = before.iter().map(|worn| worn.hair).filter(|hair| !kept.contains(&Some(*hair)));
@@ -566,7 +582,6 @@ impl Hairdresser<'_, '_> {
             wearing.worn.push(worn);
         }
         wearing.wanted = Some(made_as);
-        wearing.settles = false;
         let mut hairs = wearing.worn.iter().map(|worn| worn.hair);
         let Some(hair) = hairs.next() else { return };
         spawn_solids(&mut self.commands, wearer, hair, solids);

@@ -10,7 +10,10 @@ use super::{
     space::bound_to,
     what::WearHair,
 };
-use crate::{forces::contact::HairCollider, hair::strand::Hair};
+use crate::{
+    forces::contact::{ColliderShape, HairCollider},
+    hair::strand::Hair,
+};
 use bevy::{
     asset::LoadState,
     ecs::system::SystemParam,
@@ -54,6 +57,8 @@ pub(super) struct OwnColliders {
     pub(super) above: HashSet<Entity>,
     /// The joints that they are on: the first at or above each.
     pub(super) joints: HashSet<Entity>,
+    /// Hats, and what is above one below its joint.
+    pub(super) hats: HashSet<Entity>,
     /// Those below the wearer.
     pub(super) solids: Vec<OwnSolid>,
 }
@@ -279,9 +284,14 @@ impl Characters<'_, '_> {
         };
         let hanging = skinned.iter().filter(hangs);
         let hanging = hanging.filter_map(|s| self.rigid(s, wearer, &joints, &parts));
-        let hats = hanging.filter(|part| Hint::of(&part.name) == Hint::Worn);
-        let hats = hats.map(|part| MeshPart { skin: None, ..part }).collect();
         let own = self.own_colliders(wearer, &joints);
+        let is_own = |mesh: Entity| {
+            let mut below = self.upward(mesh).take_while(|at| !joints.contains(at));
+            below.any(|at| own.hats.contains(&at))
+        };
+        let hats = hanging.filter(|part| Hint::of(&part.name) == Hint::Worn);
+        let hats = hats.filter(|part| !is_own(part.entity));
+        let hats = hats.map(|part| MeshPart { skin: None, ..part }).collect();
         let (turn, size) = self.stands(wearer);
         Ok(Target { head, garments, hats, parts, own, turn, size })
     }
@@ -379,16 +389,20 @@ impl Characters<'_, '_> {
         true
     }
 
-    /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own.
+    /// Where the character's own colliders are. Those of other wearers, and what games put on hair, are not its own. A hat
+    /// is in the place of none.
     fn own_colliders(&self, wearer: Entity, joints: &HashSet<Entity>) -> OwnColliders {
         let mut own = OwnColliders::default();
         for (at, collider) in &self.colliders {
             let (mut joint, mut is_below) = (None, false);
+            let is_hat = matches!(collider.shape, ColliderShape::Hat { .. });
             for entity in self.upward(at) {
-                own.above.insert(entity);
-                if joint.is_none() && joints.contains(&entity) {
-                    joint = Some(entity);
-                    own.joints.insert(entity);
+                if !is_hat {
+                    own.above.insert(entity);
+                }
+                joint = joint.or_else(|| joints.get(&entity).copied());
+                if is_hat && joint.is_none() {
+                    own.hats.insert(entity);
                 }
                 is_below |= entity == wearer;
                 let is_other = entity != wearer && self.wearers.contains(entity);
@@ -396,6 +410,7 @@ impl Characters<'_, '_> {
                     break;
                 }
             }
+            own.joints.extend(joint.filter(|_| !is_hat));
             if let Some(place) = self.relative(at, joint.unwrap_or(wearer)).filter(|_| is_below) {
                 own.solids.push(OwnSolid { collider: collider.clone(), joint, place });
             }

@@ -123,8 +123,9 @@ pub struct WearHair {
     pub place: Transform,
     /// Whether colliders are fitted to head and body: balls for the head, capsules or balls for the joints
     /// that hair reaches. [`HairCollider`](crate::HairCollider)s of the game's own replace those of the bone
-    /// that they are on or below: one on a hand the hand's, one on the head, its jaw or its hat all of the
-    /// head's; on a mesh without a skin, those of the mesh. One on the character's root replaces none. Hairs
+    /// that they are on or below: one on a hand the hand's, one on the head or its jaw all of the head's; on a mesh
+    /// without a skin, those of the mesh. One on the character's root replaces none, and so does a hat
+    /// ([`HairCollider::inside`](crate::HairCollider::inside)). Hairs
     /// beside each other share them; another `WearHair` brings its own. Default `true`.
     pub colliders: bool,
     /// When it is put on, by [`Time<Fixed>::elapsed`](Time::elapsed): before the tick that reaches this; the game

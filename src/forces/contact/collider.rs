@@ -67,7 +67,7 @@ pub enum ColliderShape {
     Hull(ConvexHull),
     /// Any shape, baked.
     Grid(DistanceGrid),
-    /// A hat, which holds hair of its wearer under it and keeps all else out: an ellipsoid along the axes above a plane
+    /// A hat, which holds hair that grows under it and keeps all else out: an ellipsoid along the axes above a plane
     /// across Y.
     Hat {
         /// Half the axes of the ellipsoid (m): the longest at most 100 times the shortest.
@@ -210,9 +210,9 @@ impl HairCollider {
     /// A hat that holds hair under it: an ellipsoid of these half axes (m), with its rim at a height along Y (m), below
     /// which hair hangs out. Spawn it as a child of the head or its bone, and despawn it to take it off.
     ///
-    /// It holds hair that is worn by an entity above it, that is a child of one, or that lies below its own parent. To such
-    /// hair it comes from above within 0.4 s, however suddenly it is there; drawn strands are under it at once. Other hair
-    /// and drops stay outside. It is smooth: its friction is 0.
+    /// It holds hair that has a root under it, whatever either is a child of. To such hair it comes from above within
+    /// 0.4 s, however suddenly it is there; drawn strands are under it at once. Other hair and drops stay outside, and so
+    /// does this hair once the hat is in a hand. It is smooth: its friction is 0.
     ///
     /// # Errors
     /// As [`ellipsoid`](Self::ellipsoid), and when the rim's height is not finite or beyond 100 km.

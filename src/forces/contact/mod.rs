@@ -80,10 +80,13 @@ impl Obstacles {
         self.hats.iter().any(|hat| hat.id == collider)
     }
 
+    /// Whether this collider is a hat that holds the hair and has come down on it.
+    pub(crate) fn are_under(&self, collider: Entity) -> bool {
+        self.hats.iter().any(|hat| hat.id == collider && hat.is_down())
+    }
+
     pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
-        let count = tape.count(self.hats.len(), size_of::<f32>());
-        self.hats.resize(count, hat::WornHat::new(Entity::PLACEHOLDER));
-        self.hats.iter_mut().for_each(|hat| hat.record(tape));
+        hat::WornHat::record(&mut self.hats, tape);
     }
 }
 

@@ -24,7 +24,7 @@ use crate::{
             Hair, HairHere, MotionOwner, Regroomed, SleepCounts, SleepPose, Strand, StrandOf,
             StrandSleep, Strands, TickPose, keep_required, lacks_strands,
         },
-        worn::{self, WornBy},
+        worn,
     },
     solver::rod::{
         obstacle::{Obstacle, Solid},
@@ -127,38 +127,34 @@ fn gather_colliders(
     *all = Colliders::new(step.count, placed);
 }
 
-/// At the start of a tick: a hat holds hair that is worn by an entity above it, that is a child of one, or that lies below
-/// its parent.
+/// At the start of a tick: a hat holds hair that has a root under it, whatever either hangs on.
 fn find_hats(
     colliders: Res<TickColliders>,
-    parents: Query<&ChildOf>,
-    mut hairs: Query<(Entity, Option<&WornBy>, &mut Obstacles), With<Hair>>,
-    mut hats: Local<Vec<Entity>>,
+    mut hairs: Query<(&TickPose, &HairReach, Option<&Strands>, &mut Obstacles), With<Hair>>,
+    strands: Query<&Strand>,
 ) {
-    hats.clear();
-    let is_hat = |shape: &ColliderShape| matches!(shape, ColliderShape::Hat { .. });
-    hats.extend(colliders.iter().filter(|of| is_hat(&of.collider.shape)).map(|of| of.id));
-    for (hair, worn, mut obstacles) in &mut hairs {
-        let worn_hats = &mut obstacles.bypass_change_detection().hats;
+    let is_hat = |of: &&TickCollider| matches!(of.collider.shape, ColliderShape::Hat { .. });
+    let hats: Vec<&TickCollider> = colliders.iter().filter(is_hat).collect();
+    for (pose, reach, members, mut obstacles) in &mut hairs {
+        let worn = &mut obstacles.bypass_change_detection().hats;
         if hats.is_empty() {
-            worn_hats.clear();
+            worn.clear();
             continue;
         }
-        let parent = |of: Entity| parents.get(of).ok().map(|child| child.0);
-        let on = worn.map(|worn| worn.0).or_else(|| parent(hair));
-        let holds = |hat: &Entity| {
-            let is_above = on.is_some_and(|on| parents.iter_ancestors(*hat).any(|id| id == on));
-            is_above
-                || parent(*hat).is_some_and(|head| {
-                    hair == head || parents.iter_ancestors(hair).any(|id| id == head)
+        let before = core::mem::take(worn);
+        let holds = |hat: &&&TickCollider| {
+            let is_worn = before.iter().any(|worn| worn.is(hat.id));
+            let covers = |strand: &Strand| {
+                let root = strand.positions().first().map(|root| pose.now().point_out(*root));
+                root.is_some_and(|root| {
+                    WornHat::covers(is_worn, &hat.collider.shape, hat.pose.now().point_in(root))
                 })
+            };
+            let mut members = strands.iter_many(members.into_iter().flat_map(Strands::iter));
+            reach.is_near(pose, (hat.pose.now().translation, 0.0)) && members.any(covers)
         };
-        worn_hats.retain(|hat| hats.contains(&hat.id) && holds(&hat.id));
-        for hat in hats.iter().filter(|hat| holds(hat)) {
-            if !worn_hats.iter().any(|worn| worn.id == *hat) {
-                worn_hats.push(WornHat::new(*hat));
-            }
-        }
+        let ids: Vec<Entity> = hats.iter().filter(holds).map(|hat| hat.id).collect();
+        *worn = WornHat::held_by(ids, before);
     }
 }
 

@@ -13,7 +13,10 @@ use crate::{
         },
         worn::{hairs_of, report_no_hair},
     },
-    hairdo::tie::{TieProgress, Tied},
+    hairdo::{
+        region::wrong_plane,
+        tie::{TieProgress, Tied},
+    },
     keratin::{
         bond::{Bonds, RestShape},
         treatment::{WindingProgress, WoundOn},
@@ -50,19 +53,12 @@ impl CutBy {
     fn wrong(&self) -> Option<String> {
         match *self {
             Self::Length(length) if !(length >= SHORTEST_END && length.is_finite()) => {
-                Some(format!(
-                    "CutHair to a length of {length} m, expected {SHORTEST_END} or more: nothing is cut"
-                ))
+                Some(format!("to a length of {length} m, expected {SHORTEST_END} or more"))
             }
-            Self::Plane { point, normal }
-                if !(point.is_finite() && normal.is_finite() && normal.length_squared() > 0.0) =>
-            {
-                Some(format!(
-                    "CutHair at a plane through {point} with the normal {normal}, expected finite numbers and a \
-                     normal that is not zero: nothing is cut"
-                ))
+            Self::Length(_) => None,
+            Self::Plane { point, normal } => {
+                wrong_plane(point, normal).map(|wrong| format!("at {wrong}"))
             }
-            _ => None,
         }
     }
 
@@ -75,8 +71,10 @@ impl CutBy {
 }
 
 fn cut_all(world: &mut World, request: &CutHair) {
-    if let Some(wrong) = request.by.wrong() {
-        world.write_message(HairFault::new(FaultKind::Setting, wrong).of(request.hair));
+    let of_region = || request.region.wrong().map(|wrong| format!("of a region above {wrong}"));
+    if let Some(wrong) = request.by.wrong().or_else(of_region) {
+        let message = format!("CutHair {wrong}: nothing is cut");
+        world.write_message(HairFault::new(FaultKind::Setting, message).of(request.hair));
         return;
     }
     let hairs = hairs_of(world, request.hair);

@@ -57,7 +57,9 @@ pub enum SnapshotError {
         ticks: usize,
     },
     /// The hair has another number of strands.
-    #[error("the snapshot is of {found} strands, the hair has {expected}")]
+    #[error(
+        "the snapshot is of {found} strands, the hair has {expected}: hair that is another begins with new snapshots"
+    )]
     Strands {
         /// Those of the snapshot.
         found: usize,
@@ -65,7 +67,10 @@ pub enum SnapshotError {
         expected: usize,
     },
     /// A strand has another number of nodes.
-    #[error("strand {strand} of the snapshot has {found} nodes, that of the hair {expected}")]
+    #[error(
+        "strand {strand} of the snapshot has {found} nodes, that of the hair {expected}: hair that is another begins \
+         with new snapshots"
+    )]
     Nodes {
         /// Its index.
         strand: usize,
@@ -73,6 +78,14 @@ pub enum SnapshotError {
         found: usize,
         /// Those of the hair.
         expected: usize,
+    },
+    /// A strand ends where it did not.
+    #[error(
+        "strand {strand} was cut, or has grown back, since the snapshot: hair that is cut begins with new snapshots"
+    )]
+    Cut {
+        /// Its index.
+        strand: usize,
     },
     /// The bytes do not begin as a snapshot of this kind and version does.
     #[error(

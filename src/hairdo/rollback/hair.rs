@@ -14,8 +14,8 @@ use crate::{
         environment::{BlownAir, WindReceived},
     },
     hair::strand::{
-        AddedMass, HeldNodes, HeldNodesState, MotionOwner, Settling, SleepCounts, SleepPose,
-        Strand, StrandHistory, StrandSleep, Strands, TickPose,
+        AddedMass, CutStrand, HeldNodes, HeldNodesState, MotionOwner, Settling, SleepCounts,
+        SleepPose, Strand, StrandHistory, StrandSleep, Strands, TickPose,
     },
     hairdo::tie::TieProgress,
     keratin::{
@@ -81,6 +81,7 @@ pub(super) type StrandState = (
         Option<&'static mut HeldNodesState>,
         Option<&'static mut WindingProgress>,
         Option<&'static mut TieProgress>,
+        Option<&'static CutStrand>,
     ),
 );
 
@@ -228,9 +229,12 @@ impl Whole<'_, '_, '_> {
         }
     }
 
-    /// How many nodes each strand has.
-    fn nodes(&self) -> impl Iterator<Item = usize> {
-        self.strands.iter_many(self.members).map(|(strand, ..)| strand.nodes())
+    /// How many nodes each strand has, and where it is cut.
+    fn ends(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.strands.iter_many(self.members).map(|(strand, .., held)| {
+            let cut = held.4.filter(|cut| cut.fits(strand.nodes()));
+            [strand.nodes() as u32, cut.map_or(0, |cut| cut.end.to_bits())]
+        })
     }
 }
 
@@ -303,8 +307,8 @@ impl HairSnapshot {
     ) -> Result<(), SnapshotError> {
         with_whole(hair, strands, |whole| {
             let mut tape = Tape::Write(&mut self.0);
-            tape.count(whole.nodes().count(), 0);
-            whole.nodes().for_each(|nodes| tape.value(&mut (nodes as u32)));
+            tape.count(whole.ends().count(), 0);
+            whole.ends().for_each(|mut end| tape.value(&mut end));
             whole.record(&mut tape, conditions, tick);
             Ok(())
         })
@@ -319,15 +323,19 @@ impl HairSnapshot {
     ) -> Result<(), SnapshotError> {
         with_whole(hair, strands, |whole| {
             let mut tape = Tape::of(&self.0);
-            let own = own_nodes(&mut tape);
-            let (found, expected) = (own.len(), whole.nodes().count());
+            let own = own_ends(&mut tape);
+            let (found, expected) = (own.len(), whole.ends().count());
             if found != expected {
                 return Err(SnapshotError::Strands { found, expected });
             }
-            let nodes = own.zip(whole.nodes()).enumerate();
-            if let Some((strand, (found, expected))) = nodes.into_iter().find(|(_, (a, b))| a != b)
-            {
-                return Err(SnapshotError::Nodes { strand, found, expected });
+            let ends = own.zip(whole.ends()).enumerate();
+            let other = ends.into_iter().find(|(_, (then, now))| then != now);
+            if let Some((strand, (then, now))) = other {
+                let [found, expected] = [then[0] as usize, now[0] as usize];
+                return Err(match then[1] == now[1] {
+                    true => SnapshotError::Nodes { strand, found, expected },
+                    false => SnapshotError::Cut { strand },
+                });
             }
             whole.record(&mut tape, conditions, tick);
             Ok(())
@@ -335,18 +343,17 @@ impl HairSnapshot {
     }
 }
 
-/// The strands' numbers of nodes that a snapshot begins with; leaves the tape after them.
-fn own_nodes<'a>(tape: &mut Tape<'a>) -> impl ExactSizeIterator<Item = usize> + use<'a> {
-    let count = tape.count(0, size_of::<u32>());
-    let nodes = tape.next(count * size_of::<u32>()).unwrap_or_default();
-    let nodes = nodes.as_chunks::<4>().0.iter();
-    nodes.map(|nodes| u32::from_le_bytes(*nodes) as usize)
+/// The strands' numbers of nodes and cuts that a snapshot begins with; leaves the tape after them.
+fn own_ends<'a>(tape: &mut Tape<'a>) -> impl ExactSizeIterator<Item = [u32; 2]> + use<'a> {
+    let count = tape.count(0, size_of::<[u32; 2]>());
+    let ends = tape.next(count * size_of::<[u32; 2]>()).unwrap_or_default();
+    ends.as_chunks::<8>().0.iter().map(|end| bytemuck::pod_read_unaligned(end))
 }
 
 /// Whether a state has all its parts, of lengths that belong together.
 fn is_whole(state: &[u8]) -> bool {
     let mut tape = Tape::of(state);
-    let nodes = own_nodes(&mut tape);
+    let ends = own_ends(&mut tape);
     let (mut pose, mut counts, mut reach) = (TickPose::default(), default(), default());
     let (mut sleep, mut neighbours, mut water) = (default(), LockNeighbours::default(), default());
     let mut obstacles = Obstacles::default();
@@ -360,7 +367,7 @@ fn is_whole(state: &[u8]) -> bool {
         obstacles: Some(&mut obstacles),
     };
     hair.record(&mut tape, None, TickMoment::default());
-    for nodes in nodes {
+    for [nodes, _] in ends {
         let (mut strand, mut added, mut sleep, mut still) =
             (Strand::default(), default(), default(), default());
         let (mut bonds, mut changes, mut rest, mut treatments) =
@@ -387,7 +394,7 @@ fn is_whole(state: &[u8]) -> bool {
             tie: Some(&mut tie),
         };
         parts.record(&mut tape);
-        if !tape.is_whole() || !strand.has_nodes(nodes) || !moisture.is_even() {
+        if !tape.is_whole() || !strand.has_nodes(nodes as usize) || !moisture.is_even() {
             return false;
         }
     }

@@ -61,6 +61,11 @@ fn tie(
         faults.write(HairFault::new(FaultKind::NoTarget, message).of(hair));
         return;
     }
+    if let Some(wrong) = region.wrong() {
+        let message = format!("TieHair of a region above {wrong}: no strand is tied");
+        faults.write(HairFault::new(FaultKind::Setting, message).of(hair));
+        return;
+    }
     for &hair in of.of(&hair) {
         let Ok(members) = hairs.get(hair) else {
             faults.write(of.no_target("TieHair", hair));

@@ -47,7 +47,7 @@ pub(super) fn settle_elsewhere(
     for (hair, settled) in ended {
         world.entity_mut(hair).remove::<Elsewhere>();
         if let Some(settled) = settled {
-            take_back(world, hair, settled);
+            settled.lay(world, hair);
         }
     }
     for hair in begun {
@@ -59,7 +59,7 @@ pub(super) fn settle_elsewhere(
             }
             None => {
                 if let Some(settled) = work.settle() {
-                    take_back(world, hair, settled);
+                    settled.lay(world, hair);
                 }
             }
         }
@@ -112,26 +112,28 @@ impl Work {
     }
 }
 
-/// Ends the settling of hair that is still the same.
-fn take_back(world: &mut World, hair: Entity, settled: Settled) {
-    let members = world.get::<Strands>(hair).map(|members| members.collection().to_vec());
-    let members = members.unwrap_or_default();
-    let nodes = |member: &Entity| world.get::<Strand>(*member).map(Strand::nodes);
-    let is_same = members.len() == settled.strands.len()
-        && members.iter().zip(&settled.strands).all(|(m, s)| nodes(m) == Some(s.0.nodes()));
-    if !is_same {
-        return;
-    }
-    for (member, (strand, bonds)) in members.into_iter().zip(settled.strands) {
-        let mut member = world.entity_mut(member);
-        let edges = strand.edges();
-        member.insert(strand);
-        if member.get::<Bonds>().is_none_or(|bonds| bonds.joints.len() != edges) {
-            member.insert(bonds);
+impl Settled {
+    /// Lays a hair as it has settled, if its strands are still the same, and ends its settling. What is on it stays.
+    pub(crate) fn lay(self, world: &mut World, hair: Entity) {
+        let members = world.get::<Strands>(hair).map(|members| members.collection().to_vec());
+        let members = members.unwrap_or_default();
+        let nodes = |member: &Entity| world.get::<Strand>(*member).map(Strand::nodes);
+        let is_same = members.len() == self.strands.len()
+            && members.iter().zip(&self.strands).all(|(m, s)| nodes(m) == Some(s.0.nodes()));
+        if !is_same {
+            return;
         }
+        for (member, (strand, bonds)) in members.into_iter().zip(self.strands) {
+            let mut member = world.entity_mut(member);
+            let edges = strand.edges();
+            member.insert(strand);
+            if member.get::<Bonds>().is_none_or(|bonds| bonds.joints.len() != edges) {
+                member.insert(bonds);
+            }
+        }
+        for fault in self.faults {
+            world.write_message(fault.of(hair));
+        }
+        end(world, hair);
     }
-    for fault in settled.faults {
-        world.write_message(fault.of(hair));
-    }
-    end(world, hair);
 }

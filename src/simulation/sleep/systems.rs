@@ -11,7 +11,10 @@ use crate::{
         setting::Settings,
     },
     forces::{
-        contact::{HairReach, Obstacles, StrandContact, TickCollider, TickColliders, seen_from},
+        contact::{
+            ColliderShape, HairReach, Obstacles, StrandContact, TickCollider, TickColliders,
+            seen_from,
+        },
         environment::{AirDrag, Gravity, LocalWinds, Winds},
     },
     hair::{
@@ -37,6 +40,7 @@ use crate::{
 };
 use bevy::{
     ecs::{entity::EntityHashMap, system::SystemParam},
+    math::Affine3A,
     prelude::*,
 };
 
@@ -134,12 +138,22 @@ pub(super) struct WakeEvents {
     /// Colliders that appeared, disappeared or moved: strands within reach of these wake (m).
     pub(super) solids: Vec<(Solid, f32)>,
     winds: LocalWinds,
+    /// The hats that hide what is above their rims: from the hair's frame to theirs, and the height of the rim (m).
+    hats: Vec<(Affine3A, f32)>,
 }
 
 impl WakeEvents {
-    /// All strands wake.
-    fn all(sleep: SleepSettings) -> Self {
-        Self { sleep, all_wake: true, solids: Vec::new(), winds: LocalWinds::default() }
+    /// Changes of hair that has none yet.
+    fn new(sleep: SleepSettings, all_wake: bool, solids: Vec<(Solid, f32)>) -> Self {
+        Self { sleep, all_wake, solids, winds: LocalWinds::default(), hats: Vec::new() }
+    }
+
+    /// Whether no part of a strand is to be seen.
+    fn are_hiding(&self, strand: &Strand) -> bool {
+        let hides = |(to_hat, rim): &(Affine3A, f32)| {
+            strand.positions().iter().all(|p| to_hat.transform_point3(*p).y > *rim)
+        };
+        self.hats.iter().any(hides)
     }
 }
 
@@ -166,12 +180,7 @@ impl SleepSnapshot {
         self.conditions = Some(conditions);
         let clearance = conditions.contact.radius + CLEARANCE;
         let solids = self.compare_solids(seen, distance, clearance, substeps);
-        WakeEvents {
-            sleep: conditions.sleep,
-            all_wake: !(rests && same),
-            solids,
-            winds: LocalWinds::default(),
-        }
+        WakeEvents::new(conditions.sleep, !(rests && same), solids)
     }
 
     /// The solids that have changed, before and after, with the distance within which they may act in
@@ -291,16 +300,23 @@ fn update_sleep(
         // Hair without simulated strands has none to wake; the first that it gets are awake.
         if *sleepers == SleepCounts::default() {
             snapshot.conditions = None;
-            wake_events.push(WakeEvents::all(settings.sleep.of(hair)));
+            wake_events.push(WakeEvents::new(settings.sleep.of(hair), true, Vec::new()));
             continue;
         }
         // A collider that comes within reach counts as new while it is still far from any strand.
-        let near = colliders.near(frame, reach, &mut scratch);
-        let seen = near.map(|placed| SeenCollider::of(frame, obstacles, placed)).collect();
+        let near: Vec<&TickCollider> = colliders.near(frame, reach, &mut scratch).collect();
+        let seen = near.iter().map(|placed| SeenCollider::of(frame, obstacles, placed)).collect();
         let is_regroomed = regroomed.members;
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
         new.winds = winds.seen_from(frame);
+        let hiding = near.iter().filter(|of| obstacles.is_some_and(|all| all.are_under(of.id)));
+        new.hats.extend(hiding.filter_map(|of| {
+            let ColliderShape::Hat { rim, hides: true, .. } = of.collider.shape else {
+                return None;
+            };
+            Some((of.pose.now().affine().inverse() * frame.now().affine(), rim))
+        }));
         wake_events.push(new);
     }
     // Strands are mostly grouped by hair.
@@ -369,9 +385,11 @@ fn decide(item: &mut SleepCandidate<'_>, wake_events: &WakeEvents, seconds: f32)
         sleep.wake_up();
         return;
     }
+    // What a hat hides may tremble unseen between it and the head.
+    let is_still = stays(&still.positions, strand.positions(), distance)
+        && keeps_turn(&still.orientations, strand.orientations(), angle);
     if restless
-        || !stays(&still.positions, strand.positions(), distance)
-        || !keeps_turn(&still.orientations, strand.orientations(), angle)
+        || !is_still && !wake_events.are_hiding(strand)
         || has_moved_root(strand, still, distance, angle)
         || pulls(strand, still, targets, distance)
         || is_blown(strand, &wake_events.winds)

@@ -26,6 +26,8 @@ enum Scene {
     Perm,
     /// Gathered by a tie, and a tip is led.
     Tied,
+    /// Put on and taken off, in rain.
+    Hat,
     Shower,
     Wet,
     /// A groom on the skin of a character that bends, in gusts and rain.
@@ -42,6 +44,7 @@ impl Scene {
         Self::BlowDry,
         Self::Perm,
         Self::Tied,
+        Self::Hat,
         Self::Shower,
         Self::Wet,
         #[cfg(all(feature = "groom", feature = "save"))]
@@ -62,6 +65,7 @@ struct Moment {
     hairs: Vec<HairSnapshot>,
     world: HairWorldSnapshot,
     held: Vec<Held>,
+    has_hat: bool,
 }
 
 /// What is rolled back, and what was seen at each tick.
@@ -95,6 +99,26 @@ fn differ(a: &[u8], b: &[u8]) -> Vec<(usize, usize)> {
     other.map(|i| (i, b.len())).take(8).collect()
 }
 
+/// Whether the scene's hat is on.
+fn has_hat(world: &World, past: &Past) -> bool {
+    past.scene == Scene::Hat && world.entity(past.moved[1].0).contains::<HairCollider>()
+}
+
+/// Puts the scene's hat on or takes it off.
+fn put_hat(world: &mut World, past: &Past, on: bool) {
+    if has_hat(world, past) != on {
+        let mut hat = world.entity_mut(past.moved[1].0);
+        match on {
+            true => _ = hat.insert(hat_of_head()),
+            false => _ = hat.remove::<HairCollider>(),
+        }
+    }
+}
+
+fn hat_of_head() -> HairCollider {
+    HairCollider::inside(Vec3::new(0.1, 0.105, 0.1), 0.02).unwrap()
+}
+
 /// The present state.
 fn now(world: &mut World, past: &Past, snapshots: &mut SystemState<HairSnapshots>) -> Moment {
     let mut take = snapshots.get_mut(world).unwrap();
@@ -111,7 +135,7 @@ fn now(world: &mut World, past: &Past, snapshots: &mut SystemState<HairSnapshots
         (strand.get::<WoundOn>().copied(), strand.get::<Tied>().copied())
     });
     let held = held.collect();
-    Moment { hairs, world: shared, held }
+    Moment { hairs, world: shared, held, has_hat: has_hat(world, past) }
 }
 
 /// Asserts that a tick begins as it did before.
@@ -122,6 +146,7 @@ fn compare(now: &Moment, first: &Moment, of: &str) {
     }
     assert_eq!(differ(&now.world.to_bytes(), &first.world.to_bytes()), [], "world in {of}");
     assert!(now.world == first.world && now.held == first.held, "world in {of}");
+    assert_eq!(now.has_hat, first.has_hat, "{of}");
 }
 
 /// Puts back what the game sets, then the snapshots, after a way through bytes.
@@ -137,6 +162,7 @@ fn put_back(world: &mut World, past: &Past, to: &Moment, state: &mut SystemState
             None => _ = strand.remove::<Tied>(),
         }
     }
+    put_hat(world, past, to.has_hat);
     let mut snapshots = state.get_mut(world).unwrap();
     for (hair, snapshot) in past.hairs.iter().zip(&to.hairs) {
         let snapshot = HairSnapshot::from_bytes(&snapshot.to_bytes()).unwrap();
@@ -245,6 +271,7 @@ fn play(world: &mut World) {
                     _ => {}
                 }
             }
+            Scene::Hat => put_hat(world, &past, (20..80).contains(&(tick % 110))),
             Scene::Wet | Scene::Shower if tick % 150 == 3 => {
                 world.trigger(SoakHair::dripping(hair));
             }
@@ -313,6 +340,10 @@ fn set(app: &mut App, scene: Scene) -> (Vec<(Entity, Transform)>, Vec<Entity>) {
             let at = Transform::from_translation(out * 0.12)
                 .with_rotation(Quat::from_rotation_arc(Vec3::Y, out));
             moved.push(world.spawn((HairTie::default(), at, ChildOf(first))).id());
+        }
+        Scene::Hat => {
+            moved.push(world.spawn((hat_of_head(), ChildOf(first))).id());
+            rain(world, Vec3::ZERO, 150.0);
         }
         Scene::Shower => rain(world, Vec3::ZERO, 150.0),
         Scene::Wet => world.trigger(SoakHair::dripping(hair)),

@@ -183,6 +183,14 @@ fn what_cannot_be_rolled_back_says_so() {
     assert_eq!(put_back(&mut app, other, &snapshot), Err(nodes));
     let strands = SnapshotError::Strands { found: 0, expected: 1 };
     assert_eq!(put_back(&mut app, hair, &HairSnapshot::default()), Err(strands));
+    // Cut off in its last edge it has as many nodes.
+    app.world_mut().trigger(CutHair::all(other, CutBy::Length(0.199)));
+    app.world_mut().flush();
+    let cut = taken(&mut app, other).unwrap();
+    assert_eq!(put_back(&mut app, other, &cut), Ok(()));
+    app.world_mut().trigger(CutHair::all(other, CutBy::Length(0.198)));
+    app.world_mut().flush();
+    assert_eq!(put_back(&mut app, other, &cut), Err(SnapshotError::Cut { strand: 0 }));
     assert_eq!(taken(&mut app, strand), Err(SnapshotError::NoHair { entity: strand }));
     app.world_mut().entity_mut(hair).insert(MotionOwner::Gpu);
     assert_eq!(taken(&mut app, hair), Err(SnapshotError::OnGpu { entity: hair }));
@@ -202,4 +210,33 @@ fn what_cannot_be_rolled_back_says_so() {
     };
     app.add_systems(FixedUpdate, second).insert_resource(TimeUpdateStrategy::FixedTimesteps(2));
     app.update();
+}
+
+/// By a library of rollback, which spawns again what was despawned meanwhile; or on another machine.
+#[test]
+fn a_hat_that_is_spawned_again_is_on_as_it_was() {
+    let mut app = test_app(60.0);
+    let hair = character(app.world_mut(), Vec3::ZERO, 30);
+    let hat = || HairCollider::inside(Vec3::new(0.1, 0.105, 0.1), 0.02).unwrap();
+    let first = app.world_mut().spawn(hat()).id();
+    run(&mut app, 3.0);
+    let snapshot = taken(&mut app, hair).unwrap();
+    let before = strands_of(&app, hair);
+    let nodes = |app: &App| -> Vec<Vec3> {
+        before.iter().flat_map(|id| strand(app, *id).positions().to_vec()).collect()
+    };
+    let was = nodes(&app);
+    let continued = |app: &mut App| {
+        run(app, 0.1);
+        bits(app, hair)
+    };
+    let expected = continued(&mut app);
+    // One in between takes the entity's place.
+    app.world_mut().despawn(first);
+    app.world_mut().spawn_empty();
+    app.world_mut().spawn(hat());
+    run(&mut app, 0.2);
+    assert_eq!(put_back(&mut app, hair, &snapshot), Ok(()));
+    assert!(taken(&mut app, hair).unwrap() == snapshot && nodes(&app) == was);
+    assert!(continued(&mut app) == expected);
 }
