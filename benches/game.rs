@@ -32,7 +32,7 @@ mod scenes {
 
 use bevy::{prelude::*, tasks::ComputeTaskPool};
 use bevy_keratin::{
-    HairScreenShare,
+    HairScreenShare, SleepCounts,
     authoring::plant::{HairPreset, Scalp},
     prelude::*,
 };
@@ -43,7 +43,7 @@ use std::{
 
 const THREADS: &str = "KERATIN_BENCH_THREADS";
 
-/// The rows to print, if not all: presets by name, `worn`, `wet` or a preset as `wet-wavy`, `crowd`,
+/// The rows to print, if not all: presets by name, `standing`, `worn`, `wet` or a preset as `wet-wavy`, `crowd`,
 /// `wet-crowd`.
 const ONLY: &str = "KERATIN_BENCH_ONLY";
 
@@ -76,6 +76,9 @@ fn rows(threads: usize) {
         if wanted(&name) {
             preset_rows(&name, preset, threads);
         }
+    }
+    for preset in HairPreset::ALL.into_iter().filter(|_| wanted("standing")) {
+        standing_rows(preset, threads);
     }
     if wanted("worn") {
         worn::rows(threads);
@@ -116,6 +119,28 @@ fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
     }
     let nodes = strands.first().map_or(0, Strand::nodes);
     println!("{name}: {} guides of {nodes} nodes", strands.len());
+}
+
+/// Five seconds after a character has come to stand, beside one whose hair never sleeps.
+fn standing_rows(preset: HairPreset, threads: usize) {
+    let strands = plant(preset);
+    let [sleeping, never] = [SleepSettings::default(), SleepSettings::never()].map(|sleep| {
+        let mut app = app(threads);
+        app.insert_resource(HairDefault(sleep));
+        let hair = person(&mut app, preset, &strands, Vec3::ZERO);
+        (0..300).for_each(|_| app.update());
+        let awake = app.world().get::<SleepCounts>(hair).map_or(0, |counts| counts.awake);
+        let [ms] = in_turns(&mut app, |_, _| {});
+        (ms, awake)
+    });
+    println!(
+        "{} standing | {threads} | on | {:.3} | {:.3} of never asleep, {} of {} awake",
+        preset.name().to_lowercase(),
+        sleeping.0,
+        sleeping.0 / never.0,
+        sleeping.1,
+        strands.len()
+    );
 }
 
 /// Two near characters, twenty in the background beside them, then a hundred far off as well.

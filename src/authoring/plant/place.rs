@@ -5,15 +5,17 @@ use crate::base::grid::KdTree;
 use bevy::prelude::*;
 use rand::{SeedableRng, rngs::Xoshiro256PlusPlus};
 
-/// How many triangles are tested for each place: those with the nearest centroids.
-const CANDIDATES: usize = 24;
+/// Triangles of which the largest is so many times as large as the smallest are searched together.
+const ALIKE: f32 = 2.0;
+
+/// By how much farther a triangle is looked for than it can be, as a share: distances are rounded.
+const SLACK: f32 = 1e-4;
 
 impl RootOnMesh {
     /// The points of a mesh that are nearest to `places`, each with its distance (m): the roots of
     /// a groom that was made for this mesh. In the mesh's own space.
     ///
-    /// Searched among the 24 triangles with the nearest centroids; where triangles differ a lot in
-    /// size, another may be nearer.
+    /// Of triangles that are equally near, the one with the nearest centroid.
     ///
     /// ```
     /// # use bevy_keratin::authoring::plant::*; use bevy::prelude::*;
@@ -29,24 +31,53 @@ impl RootOnMesh {
         places: impl IntoIterator<Item = Vec3>,
     ) -> Result<Vec<(Self, f32)>, PlantError> {
         let surface = Surface::of(mesh)?;
-        let middle = |i: usize| surface.corners(i).iter().sum::<Vec3>() / 3.0;
-        let tree = KdTree::new((0..surface.triangles.len()).map(middle).zip(0u32..));
+        let sizes = by_size(&surface);
         let nearest = |place: Vec3| {
-            let mut best = (f32::INFINITY, Self::default());
-            for (i, _) in tree.nearest::<CANDIDATES>(place) {
-                let corners = surface.corners(i as usize);
-                let weights = nearest_on(corners, place);
-                let at = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
-                let apart = at.distance(place);
-                if apart < best.0 {
-                    let vertices = surface.triangles[i as usize];
-                    best = (apart, Self { vertices, weights });
-                }
+            // Distance, square of that of the centroid, triangle.
+            let mut best = (f32::INFINITY, f32::INFINITY, u32::MAX);
+            let mut found = Self::default();
+            for (radius, tree) in &sizes {
+                let reach = |best: f32| (best + radius) * (1.0 + SLACK);
+                tree.visit(place, reach(best.0), |i, square| {
+                    let corners = surface.corners(i as usize);
+                    let weights = nearest_on(corners, place);
+                    let at =
+                        corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
+                    let one = (at.distance(place), square, i);
+                    if one < best {
+                        best = one;
+                        found = Self { vertices: surface.triangles[i as usize], weights };
+                    }
+                    reach(best.0)
+                });
             }
-            (best.1, best.0)
+            (found, best.0)
         };
         Ok(places.into_iter().map(nearest).collect())
     }
+}
+
+/// The triangles in groups of like size, small ones first: how far the corners of a group are from their centroids at
+/// most (m), and its centroids.
+fn by_size(surface: &Surface) -> Vec<(f32, KdTree)> {
+    let mut all: Vec<(f32, Vec3, u32)> = (0..surface.triangles.len())
+        .zip(0u32..)
+        .map(|(triangle, i)| {
+            let corners = surface.corners(triangle);
+            let middle = corners.iter().sum::<Vec3>() / 3.0;
+            let radius = corners.iter().map(|p| p.distance(middle)).fold(0.0, f32::max);
+            (radius, middle, i)
+        })
+        .collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.2.cmp(&b.2)));
+    let mut groups = Vec::new();
+    let mut rest = &all[..];
+    while let Some((smallest, ..)) = rest.first() {
+        let (alike, larger) = rest.split_at(rest.partition_point(|of| of.0 <= smallest * ALIKE));
+        rest = larger;
+        groups.push((alike[alike.len() - 1].0, KdTree::new(alike.iter().map(|of| (of.1, of.2)))));
+    }
+    groups
 }
 
 /// Barycentric weights of the point of a triangle that is nearest to `p` (Ericson 2005, "Real-Time
@@ -108,6 +139,37 @@ pub(crate) fn surface_points(mesh: &Mesh, count: usize) -> Result<Vec<SurfacePoi
 mod tests {
     use super::*;
     use rand::RngExt;
+
+    #[test]
+    fn of_triangles_of_all_sizes_the_nearest_is_found() {
+        let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+        let mut place =
+            |size: f32| size * Vec3::from_array([(); 3].map(|()| random.random_range(-1.0..1.0)));
+        let corners: Vec<[Vec3; 3]> = (0..400)
+            .map(|i| {
+                // Few are large, as on a body of few triangles with a face of many.
+                let (middle, size) = (place(1.0), if i % 40 == 0 { 1.0 } else { 0.03 });
+                [middle + place(size), middle + place(size), middle + place(size)]
+            })
+            .collect();
+        let mesh = Mesh::new(
+            bevy::mesh::PrimitiveTopology::TriangleList,
+            bevy::asset::RenderAssetUsages::default(),
+        )
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, corners.concat());
+        let places: Vec<Vec3> = (0..300).map(|i| place(if i < 10 { 30.0 } else { 1.2 })).collect();
+        let found = RootOnMesh::nearest(&mesh, places.iter().copied()).unwrap();
+        for (p, (_, apart)) in places.iter().zip(found) {
+            let of = |corners: &[Vec3; 3]| {
+                let w = nearest_on(*corners, *p);
+                (corners[0] * w.x + corners[1] * w.y + corners[2] * w.z).distance(*p)
+            };
+            let least = corners.iter().map(of).fold(f32::INFINITY, f32::min);
+            assert!((apart - least).abs() < 1e-5 * (1.0 + least), "{apart}, not {least}");
+        }
+        let nowhere = RootOnMesh::nearest(&mesh, [Vec3::NAN]).unwrap();
+        assert!(!nowhere[0].1.is_finite());
+    }
 
     #[test]
     fn the_nearest_point_of_a_triangle_is_nearer_than_any_other() {

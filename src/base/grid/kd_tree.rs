@@ -57,6 +57,15 @@ impl KdTree {
         (found[0].1, found[0].0)
     }
 
+    /// Visits the points within `reach` of `point`, nearer halves first, with their indices and squared distances; each
+    /// visit returns the reach from then on.
+    #[cfg(feature = "groom")]
+    pub(crate) fn visit(&self, point: Vec3, reach: f32, mut each: impl FnMut(u32, f32) -> f32) {
+        if point.is_finite() {
+            visit_box(&self.nodes, point, Vec3::ZERO, &mut { reach }, &mut each);
+        }
+    }
+
     /// The same among those that `accepts` allows by index and squared distance.
     pub fn nearest_of<const N: usize, F: Fn(u32, f32) -> bool>(
         &self,
@@ -104,6 +113,31 @@ fn search_box(
     const SLACK: f32 = 1.0 - 1e-5;
     if found.last().is_some_and(|last| off.length_squared() * SLACK <= last.0) {
         search_box(far, point, off, accepts, found);
+    }
+}
+
+#[cfg(feature = "groom")]
+fn visit_box(
+    nodes: &[Node],
+    point: Vec3,
+    off: Vec3,
+    reach: &mut f32,
+    each: &mut impl FnMut(u32, f32) -> f32,
+) {
+    let middle = nodes.len() / 2;
+    let Some(node) = nodes.get(middle) else { return };
+    let square = node.place.distance_squared(point);
+    if square <= *reach * *reach {
+        *reach = each(node.item, square);
+    }
+    let beyond = point[node.axis] - node.place[node.axis];
+    let (near, far) = (&nodes[..middle], &nodes[middle + 1..]);
+    let (near, far) = if beyond < 0.0 { (near, far) } else { (far, near) };
+    visit_box(near, point, off, reach, each);
+    let mut off = off;
+    off[node.axis] = beyond;
+    if off.length() <= *reach {
+        visit_box(far, point, off, reach, each);
     }
 }
 
