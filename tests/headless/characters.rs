@@ -464,6 +464,16 @@ fn a_helmet_holds_hair_while_it_is_shown() {
     app.world_mut().entity_mut(root).remove::<WearHair>();
     (0..2).for_each(|_| app.update());
     assert!(hats(&mut app).is_empty());
+    // A hat of the game's own is left to the game.
+    let own = HairCollider::inside(HALF * 1.2, 0.0).unwrap();
+    let (mut app, root, helmet, _) = wear("Knight_Helmet", Visibility::Inherited, true);
+    app.world_mut().entity_mut(root).remove::<WearHair>();
+    app.world_mut().entity_mut(helmet).insert(own);
+    app.update();
+    app.world_mut().entity_mut(root).insert(WearHair::new(HairPreset::Curly));
+    worn(&mut app);
+    (0..2).for_each(|_| app.update());
+    assert_eq!(hats(&mut app), [false]);
     // What is no hat by its name may be old hair.
     let (mut app, ..) = wear("Mesh_7", Visibility::Inherited, false);
     (0..2).for_each(|_| app.update());

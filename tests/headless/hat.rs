@@ -357,3 +357,35 @@ fn a_hat_holds_hair_on_an_animated_head_until_it_sleeps() {
         assert!(tremble <= 8, "{tremble}");
     }
 }
+
+#[test]
+fn hair_that_a_hat_hides_sleeps_though_it_trembles() {
+    let asleep = |hides: bool| {
+        let mut scene = Scene::new(On::Head, Transform::default());
+        let world = scene.app.world_mut();
+        scene.strands.drain(..).for_each(|id| _ = world.despawn(id));
+        // Hair of 7 cm, all of it above the rim.
+        for i in 0..40 {
+            let out = Quat::from_rotation_y(2.4 * i as f32) * Vec3::new(1.0, 0.8, 0.0).normalize();
+            let node = |k: usize| out * (HEAD + 0.002 + 0.005 * k as f32);
+            let strand = Strand::from_polyline(&(0..15).map(node).collect::<Vec<_>>()).unwrap();
+            scene.strands.push(world.spawn((StrandOf(scene.hair), strand)).id());
+        }
+        world
+            .entity_mut(scene.hair)
+            .insert(HairSolver { method: SolverMethod::Sweeps, ..default() });
+        let hat = HairCollider::inside(HAT, -0.03).unwrap();
+        let hat = if hides { hat.hiding() } else { hat };
+        let hat = scene.app.world_mut().spawn((hat, ChildOf(scene.head))).id();
+        run(&mut scene.app, 5.0);
+        let above = scene.nodes().iter().filter(|p| p.y > -0.03).count();
+        let asleep = scene.app.world().get::<SleepCounts>(scene.hair).unwrap().asleep;
+        println!("hides {hides}: {asleep} of 40 asleep, {above} of 600 nodes above the rim");
+        scene.app.world_mut().despawn(hat);
+        run(&mut scene.app, 0.1);
+        assert_eq!(scene.app.world().get::<SleepCounts>(scene.hair).unwrap().asleep, 0, "awake");
+        asleep
+    };
+    let [open, hidden] = [false, true].map(asleep);
+    assert!(open < 30 && hidden == 40, "{open} and {hidden} of 40 asleep");
+}
