@@ -108,3 +108,58 @@ fn presets_look_the_same_with_the_twist_of_hair() {
         assert!(median < 5e-3 && high < 0.02, "{preset:?}: {median} m, {high} m");
     }
 }
+
+/// Where a preset is worn.
+#[derive(Clone, Copy, Debug)]
+enum On {
+    Ball,
+    Figure,
+}
+
+/// Guides of a preset without contact between them that move by more than 1 mm/s after ten seconds, and all. None may sleep.
+fn moving(preset: HairPreset, on: On, friction: bool, torsion: f32) -> [usize; 2] {
+    let mut app = app_with_meshes(60.0);
+    app.insert_resource(HairDefault(SleepSettings::never()));
+    let wearer = app.world_mut().spawn((Transform::default(), Visibility::default())).id();
+    match on {
+        On::Ball => {
+            let ball = app.world_mut().resource_mut::<Assets<Mesh>>().add(wearer::ball(0.1));
+            app.world_mut().entity_mut(wearer).insert(Mesh3d(ball));
+        }
+        On::Figure => {
+            wearer::character(&mut app, wearer, 1.0);
+        }
+    }
+    app.world_mut().entity_mut(wearer).insert(WearHair::new(preset).facing(Dir3::Z));
+    let hair = worn(&mut app);
+    let world = app.world_mut();
+    world.entity_mut(hair).insert(StrandContact { strength: 0.0, ..default() });
+    world.get_mut::<HairStiffness>(hair).unwrap().torsion = torsion;
+    if !friction {
+        for mut collider in world.query::<&mut HairCollider>().iter_mut(world) {
+            collider.friction = 0.0;
+        }
+    }
+    run(&mut app, 10.0);
+    let strands = app.world().get::<Strands>(hair).unwrap().collection();
+    let moves = |strand: &&Entity| {
+        let strand = app.world().get::<Strand>(**strand).unwrap();
+        strand.velocities().iter().any(|v| v.length() >= 1e-3)
+    };
+    [strands.iter().filter(moves).count(), strands.len()]
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn guides_of_presets_come_to_rest() {
+    for preset in HairPreset::ALL {
+        for on in [On::Ball, On::Figure] {
+            let [a, b, c, d] = [(true, 0.46), (true, 0.2), (false, 0.46), (false, 0.2)]
+                .map(|(friction, torsion)| moving(preset, on, friction, torsion));
+            println!(
+                "{preset:?} {on:?}: of {} move {} {} without friction {} {}",
+                a[1], a[0], b[0], c[0], d[0]
+            );
+        }
+    }
+}

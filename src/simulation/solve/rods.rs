@@ -66,7 +66,6 @@ struct HairParams<'a> {
     dt: f32,
     /// How points at rest in the world moved in the hair's frame.
     frame_delta: Option<Isometry3d>,
-    clearance: f32,
     bending_length: f32,
     influence: [f32; 4],
     obstacles: &'a [Obstacle],
@@ -84,8 +83,7 @@ struct RodColumns<'a> {
 
 impl<'a> Batched for RodColumns<'a> {
     type Params = HairParams<'a>;
-    /// And the obstacles near a block.
-    type Lanes = (BlockLanes, Vec<Obstacle>);
+    type Lanes = BlockLanes;
 
     fn prefetch(Member { strand, own, .. }: &Member<'_, Self>) {
         strand.prefetch();
@@ -132,19 +130,18 @@ impl<'a> Batched for RodColumns<'a> {
         params.dt
     }
 
-    fn block((block, _): &mut Self::Lanes) -> &mut BlockLanes {
+    fn block(block: &mut BlockLanes) -> &mut BlockLanes {
         block
     }
 
     fn step(
-        (block, near): &mut Self::Lanes,
+        block: &mut BlockLanes,
         sources: &[Source<'_>; LANES],
         items: &[Member<'_, Self>],
         params: &HairParams<'_>,
         attempt: Attempt,
     ) {
         gather_frames(block, sources, items);
-        block.near(params.obstacles, params.dt, params.clearance, near);
         match &params.method {
             Method::Direct(direct) => {
                 gather_tensions(block, sources);
@@ -156,12 +153,12 @@ impl<'a> Batched for RodColumns<'a> {
                 if attempt == Attempt::Second {
                     direct::soften(block);
                 }
-                direct::step(params.level, block, direct, near);
+                direct::step(params.level, block, direct, params.obstacles);
             }
             Method::Sweeps(sweeps, settings) => {
                 gather_spins(block, sources);
                 step::weigh(params.level, block, Some((settings, params.bending_length)));
-                step::step(params.level, block, sweeps, near);
+                step::step(params.level, block, sweeps, params.obstacles);
             }
         }
     }
@@ -187,7 +184,7 @@ fn step_rods(
         SimulatedHere,
     >,
     mut faults: MessageWriter<HairFault>,
-    scratch: Local<Scratch<(BlockLanes, Vec<Obstacle>)>>,
+    scratch: Local<Scratch<BlockLanes>>,
 ) {
     if !substeps.any() {
         return;
@@ -225,7 +222,6 @@ fn step_rods(
             method,
             dt,
             frame_delta: pose.frame_delta(),
-            clearance,
             bending_length: stiffness.bending_length,
             influence: influence.of(hair).as_array(),
             obstacles: obstacles.map_or(&[], |all| &all.solids),

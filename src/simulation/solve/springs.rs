@@ -66,8 +66,7 @@ struct SpringColumns<'a>(PhantomData<&'a ()>);
 
 impl<'a> Batched for SpringColumns<'a> {
     type Params = HairParams<'a>;
-    /// And the obstacles near a block.
-    type Lanes = (SpringLanes, Vec<Obstacle>);
+    type Lanes = SpringLanes;
 
     fn dt(params: &HairParams<'_>) -> f32 {
         params.step.dt
@@ -77,12 +76,12 @@ impl<'a> Batched for SpringColumns<'a> {
         params.frame_delta
     }
 
-    fn block((lanes, _): &mut Self::Lanes) -> &mut BlockLanes {
+    fn block(lanes: &mut SpringLanes) -> &mut BlockLanes {
         &mut lanes.strands
     }
 
     fn step(
-        (lanes, near): &mut Self::Lanes,
+        lanes: &mut SpringLanes,
         sources: &[Source<'_>; LANES],
         _: &[Member<'_, Self>],
         HairParams { level, step: params, obstacles, .. }: &HairParams<'_>,
@@ -94,8 +93,7 @@ impl<'a> Batched for SpringColumns<'a> {
             put_quaternions(&mut strands.edges, group, orientations, |e| &mut e.q);
         }
         weigh(*level, strands, None);
-        strands.near(obstacles, params.dt, params.clearance, near);
-        step(*level, lanes, params, near);
+        step(*level, lanes, params, obstacles);
     }
 }
 
@@ -118,7 +116,7 @@ fn step_springs(
         SimulatedHere,
     >,
     mut faults: MessageWriter<HairFault>,
-    scratch: Local<Scratch<(SpringLanes, Vec<Obstacle>)>>,
+    scratch: Local<Scratch<SpringLanes>>,
 ) {
     let gravity = gravity.clamped().0;
     let level = simd_level();

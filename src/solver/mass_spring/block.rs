@@ -82,7 +82,7 @@ fn step_simd<S: Simd>(
     let next = Xpbd::new(zero, stretch, damping, params.dt);
     let over = Xpbd::new(zero, bend, damping, params.dt);
     let zero = f32x16::splat(simd, 0.0);
-    b.consider_all_obstacles();
+    b.choose_obstacles(obstacles, params.dt, params.clearance);
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), None, params.clearance, obstacles);
     b.touched = [0.0; LANES];
     b.nodes.iter_mut().for_each(NodeLanes::release);

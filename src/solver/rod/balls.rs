@@ -16,30 +16,32 @@ const ROUNDING_MARGIN: f32 = 1.0001;
 pub(super) struct ObstacleBalls {
     center: [Lane; 3],
     radius: Lane,
+    /// Their places among all obstacles; beyond these where there are fewer than sixteen.
+    pub(super) index: [usize; LANES],
 }
 
 impl ObstacleBalls {
     /// Balls around `obstacles` for nodes in the ball around `center`.
-    pub(super) fn collect(
+    pub(super) fn collect<'a>(
         all: &mut Vec<Self>,
-        obstacles: &[Obstacle],
+        obstacles: impl Iterator<Item = (usize, &'a Obstacle)>,
         (center, radius): (Vec3, f32),
     ) {
         all.clear();
-        for obstacles in obstacles.chunks(LANES) {
-            let mut balls = Self::default();
-            for (lane, o) in obstacles.iter().enumerate() {
-                let (at, reach) = o.solid.ball();
-                // An affine displacement grows at most by its matrix' norm from the center on.
-                let moved = o.motion.map_or(0.0, |motion| {
-                    let [x, y, z] = (motion.matrix3 - Mat3A::IDENTITY).to_cols_array_2d();
-                    let norm = [x, y, z].as_flattened().iter().map(|m| m * m).sum::<f32>().sqrt();
-                    motion.transform_point3(center).distance(center) + norm * radius
-                });
-                put3(&mut balls.center, lane, at);
-                balls.radius[lane] = reach + moved;
+        for (lane, (index, o)) in (0..LANES).cycle().zip(obstacles) {
+            if lane == 0 {
+                all.push(Self { index: [usize::MAX; LANES], ..Self::default() });
             }
-            all.push(balls);
+            let (at, reach) = o.solid.ball();
+            // An affine displacement grows at most by its matrix' norm from the center on.
+            let moved = o.motion.map_or(0.0, |motion| {
+                let [x, y, z] = (motion.matrix3 - Mat3A::IDENTITY).to_cols_array_2d();
+                let norm = [x, y, z].as_flattened().iter().map(|m| m * m).sum::<f32>().sqrt();
+                motion.transform_point3(center).distance(center) + norm * radius
+            });
+            let Some(balls) = all.last_mut() else { break };
+            put3(&mut balls.center, lane, at);
+            (balls.radius[lane], balls.index[lane]) = (reach + moved, index);
         }
     }
 

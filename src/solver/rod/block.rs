@@ -149,28 +149,40 @@ impl BlockLanes {
         self.close_obstacles.resize(nodes, CloseObstacles::UNKNOWN);
     }
 
-    /// Any node may touch any obstacle.
-    pub(crate) fn consider_all_obstacles(&mut self) {
-        self.near_obstacles.fill(NearObstacles::ALL);
+    /// Any node may touch any obstacle that one of the block may touch in a step of `dt`.
+    pub(crate) fn choose_obstacles(&mut self, obstacles: &[Obstacle], dt: f32, clearance: f32) {
+        let mut near = NearObstacles::NONE;
+        self.obstacles_near(obstacles, dt, clearance).for_each(|(index, _)| near.add(index));
+        if near == NearObstacles::NONE {
+            self.release();
+        }
+        self.near_obstacles.fill(near);
         self.close_obstacles.fill(CloseObstacles::UNKNOWN);
     }
 
-    /// Sets `near` to the obstacles that any lane may touch in a step of `dt`.
-    pub(crate) fn near(
+    /// Nothing rests on anything: the block may have held other strands before, which did.
+    pub(super) fn release(&mut self) {
+        self.nodes.iter_mut().for_each(NodeLanes::release);
+        self.near_obstacles.fill(NearObstacles::NONE);
+    }
+
+    /// Whether any node may touch anything.
+    pub(super) fn is_near_obstacles(&self) -> bool {
+        self.near_obstacles.iter().any(|near| *near != NearObstacles::NONE)
+    }
+
+    /// The obstacles that any lane may touch in a step of `dt`, and their places among all.
+    pub(super) fn obstacles_near<'a>(
         &self,
-        obstacles: &[Obstacle],
+        obstacles: &'a [Obstacle],
         dt: f32,
         clearance: f32,
-        near: &mut Vec<Obstacle>,
-    ) {
-        near.clear();
-        if obstacles.is_empty() {
-            return;
-        }
-        let (low, high) = self.bounds(dt);
+    ) -> impl Iterator<Item = (usize, &'a Obstacle)> {
+        let (low, high) = if obstacles.is_empty() { Default::default() } else { self.bounds(dt) };
         // Nodes may move beyond their prediction, by at most an edge length in a substep.
-        let margin = clearance + self.edges.iter().map(|e| e.l[0]).fold(0.0, f32::max);
-        near.extend(obstacles.iter().filter(|o| o.may_touch(low, high, margin)).cloned());
+        let longest = self.edges.iter().flat_map(|e| e.l).fold(0.0, f32::max);
+        let margin = clearance + longest;
+        obstacles.iter().enumerate().filter(move |(_, o)| o.may_touch(low, high, margin))
     }
 
     /// The box that holds every node of every lane, before and after prediction with `dt`.

@@ -2,7 +2,7 @@
 
 use super::{
     balls::ObstacleBalls,
-    block::{BlockLanes, NodeLanes},
+    block::BlockLanes,
     obstacle::{NearObstacles, Obstacle},
 };
 use crate::base::lanes::{LANES, Real, V3, lanes_in, load, load3, splat3, store3};
@@ -33,9 +33,16 @@ pub(crate) fn choose_near<S: Simd>(
     obstacles: &[Obstacle],
 ) {
     b.escape_length = [0.0; LANES];
+    let mut balls = core::mem::take(&mut b.obstacle_balls);
     if obstacles.is_empty() {
-        // The block may have held other strands before, which rested on something.
-        b.nodes.iter_mut().for_each(NodeLanes::release);
+        balls.clear();
+    } else {
+        let whole = ball_around(simd, b);
+        ObstacleBalls::collect(&mut balls, b.obstacles_near(obstacles, dt, clearance), whole);
+    }
+    b.obstacle_balls = balls;
+    if b.obstacle_balls.is_empty() {
+        b.release();
         return;
     }
     simd.vectorize(
@@ -56,8 +63,6 @@ pub(crate) fn choose_near<S: Simd>(
             }
             let margin = Real::sqrt(pull) + edge + f32x16::splat(simd, clearance);
             let ahead = f32x16::splat(simd, FASTER * dt);
-            let whole = ball_around(simd, b);
-            ObstacleBalls::collect(&mut b.obstacle_balls, obstacles, whole);
             let each = b.near_obstacles.iter_mut().zip(&mut b.close_obstacles);
             for (n, (near, close)) in b.nodes.iter_mut().zip(each) {
                 n.release();
@@ -76,18 +81,19 @@ pub(crate) fn choose_near<S: Simd>(
                 let off = p - splat3(simd, center);
                 let radius = off.dot(off).reduce_max().sqrt() + or_endless(reach).reduce_max();
                 let (center, radius) = (splat3(simd, center), f32x16::splat(simd, radius));
-                for (balls, first) in b.obstacle_balls.iter().zip((0..).step_by(LANES)) {
+                for balls in &b.obstacle_balls {
                     for lane in lanes_in(balls.near(center, radius)) {
-                        let Some(o) = obstacles.get(first + lane) else { break };
+                        let index = balls.index[lane];
+                        let Some(o) = obstacles.get(index) else { break };
                         let mut reach = reach;
                         if o.motion.is_some() {
                             let moved = o.moved_with(p) - p;
                             reach += Real::sqrt(moved.dot(moved));
                         }
                         if o.solid.is_beyond(p, reach).any_false() {
-                            near.add(first + lane);
+                            near.add(index);
                             if o.solid.is_beyond(p, touches).any_false() {
-                                close.obstacles.add(first + lane);
+                                close.obstacles.add(index);
                             }
                         }
                     }

@@ -43,7 +43,7 @@ pub fn step(level: Level, block: &mut BlockLanes, params: &SweepParams, obstacle
 
 #[inline(always)]
 fn step_simd<S: Simd>(simd: S, b: &mut BlockLanes, params: &SweepParams, obstacles: &[Obstacle]) {
-    b.consider_all_obstacles();
+    b.choose_obstacles(obstacles, params.dt, params.clearance);
     predict_nodes(simd, b, f32x16::splat(simd, params.dt), None, params.clearance, obstacles);
     predict_edges(simd, b, params.dt);
     // The projection is chosen outside the loops, so that these have no branches.

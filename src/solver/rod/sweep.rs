@@ -39,7 +39,7 @@ pub(super) fn project<S: Simd, const P: usize>(
         left -= abreast;
     }
     b.touched = [0.0; LANES];
-    if !obstacles.is_empty() {
+    if b.is_near_obstacles() {
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         let mut touched = zero;
         for n in &b.nodes {
@@ -89,7 +89,7 @@ fn sweeps<S: Simd, const P: usize>(
         #[inline(always)]
         || {
             let edges = b.edges.len();
-            let touching = !obstacles.is_empty();
+            let touching = b.is_near_obstacles();
             let all = f32x16::splat(simd, 1.0);
             let (before, p1) = (load4(simd, &b.root), b.nodes[0].position(simd));
             let mut state = [SweepState { before, p1 }; PIPELINE];

@@ -229,7 +229,7 @@ pub(crate) fn contacts_with<S: Simd>(
         #[inline(always)]
         || {
             (b.touched, b.changed) = ([0.0; LANES], [0.0; LANES]);
-            if obstacles.is_empty() {
+            if !b.is_near_obstacles() {
                 return;
             }
             let zero = f32x16::splat(simd, 0.0);

@@ -435,7 +435,7 @@ fn leave_obstacles<S: Simd>(
             }
             b.has_fast_nodes = false;
             // Infinitely deep: no way out.
-            b.consider_all_obstacles();
+            b.choose_obstacles(obstacles, params.dt, params.clearance);
             for n in &mut b.nodes {
                 n.release();
                 let held = Real::lt(load(simd, &n.w), f32x16::splat(simd, 1e-12));
