@@ -81,6 +81,7 @@ mod pairs;
 mod papers_scenes;
 mod plant;
 mod reflection;
+mod report;
 mod rest;
 mod restyle;
 mod rods;

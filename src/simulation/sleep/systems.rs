@@ -446,7 +446,7 @@ fn comes_near(still: &SleepPose, solids: &[(Solid, f32)]) -> bool {
 }
 
 /// Whether moving air reaches the strand's root, middle or tip.
-fn is_blown(strand: &Strand, winds: &LocalWinds) -> bool {
+pub(crate) fn is_blown(strand: &Strand, winds: &LocalWinds) -> bool {
     let (p, last) = (strand.positions(), strand.edges().saturating_sub(1));
     [0, last / 2, last].into_iter().any(|i| {
         let air = winds.around_edge(p[i], p[i + 1] - p[i]);
