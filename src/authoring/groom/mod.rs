@@ -6,6 +6,8 @@
 pub mod alembic;
 mod bones;
 mod bytes;
+#[cfg(feature = "render")]
+mod drawn;
 mod foreign;
 mod format;
 pub mod gltf;
@@ -137,6 +139,9 @@ pub enum GroomError {
          short, or its scale is too small"
     )]
     Empty,
+    /// An entity that neither is hair nor wears any.
+    #[error("the entity is no Hair and wears none, expected one of these: ask after HairWorn")]
+    NoHair,
     /// Every strand was left out.
     #[error("no strand is left, expected 1 or more: {losses}; repair the source")]
     AllLeftOut {

@@ -1,5 +1,7 @@
 //! Grooms: files read and written, malformed ones refused, strands reshaped and worn.
 
+#[cfg(feature = "render")]
+mod drawn;
 mod files;
 mod gltf;
 mod malformed;
