@@ -25,6 +25,7 @@ use crate::{
         worn::{PassedTypes, Wearer, WornBy, WornHair},
     },
     hairdo::style::{HairStyle, KeptStyle},
+    keratin::bond::StrandStiffness,
     simulation::settle::{SettleConditions, Settled, Settling},
     water::HairWetting,
 };
@@ -638,7 +639,13 @@ impl Hairdresser<'_, '_> {
         let hair = hair.id();
         let strands =
             new.strands.into_iter().map(move |(strand, bonds)| (StrandOf(hair), strand, bonds));
-        self.commands.spawn_batch(strands.collect::<Vec<_>>());
+        let strands = strands.collect::<Vec<_>>();
+        if new.stiffness.is_empty() {
+            self.commands.spawn_batch(strands);
+        } else {
+            let own = new.stiffness.into_iter().map(|share| StrandStiffness { share });
+            self.commands.spawn_batch(strands.into_iter().zip(own).collect::<Vec<_>>());
+        }
         let mut own = self.commands.entity(hair);
         #[cfg(feature = "save")]
         if let Some(hairdo) = wear.hairdo {
