@@ -3,6 +3,8 @@
 #[cfg(feature = "render")]
 use super::GroomStrand;
 use super::{Groom, GroomError, RootBones};
+#[cfg(feature = "save")]
+use crate::hairdo::save::Regrowth;
 use crate::{
     authoring::attach::RootsOnBones,
     base::{
@@ -20,7 +22,11 @@ use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 ///
 /// The groom's origin becomes the entity's: see [`GroomSettings::origin`](super::GroomSettings::origin).
 /// Roots of a groom with [bones](Groom::bones) follow these: see [`RootsOnBones`].
-/// Changing this component, or reloading the asset, makes the hair again; removing it despawns it.
+/// Changing this component, or reloading the asset, makes the hair again; removing it despawns it. Where the groom is the
+/// same asset, what has been done to the hair stays (feature `save`): each strand takes it over from the one of its
+/// number, or where there are more or fewer from the nearest one. It is what differs from how the strand grew: the bonds'
+/// memory and rates, pose, water, ties, the share of its [`HairStyle`](crate::HairStyle) that is left. Hair that was cut has
+/// the lengths of the groom again.
 /// A groom that cannot be used is reported as a [`HairFault`].
 ///
 /// With the feature `render` all strands that are not guides become
@@ -282,6 +288,13 @@ fn spawn_grown(
             }
             continue;
         };
+        // The same groom, changed: what has been done to the hair stays.
+        #[cfg(feature = "save")]
+        let regrowth = (grown.from.as_ref())
+            .filter(|before| before.groom == wanted.groom && members.is_some())
+            .map(|_| {
+                Regrowth::take(&mut commands, hair, |strand| strand.contains::<GrownStrand>())
+            });
         let has_look = has_look && !grown.gave_look;
         grown.take_off(&mut commands, hair, members, &own);
         grown.from = Some(wanted.clone());
@@ -293,6 +306,10 @@ fn spawn_grown(
             Ok(strands) => {
                 let marked = strands.into_iter().map(|strand| (strand, GrownStrand));
                 commands.insert_batch(marked.collect::<Vec<_>>());
+                #[cfg(feature = "save")]
+                if let Some(regrowth) = regrowth {
+                    regrowth.put_on(&mut commands, hair, |of| of.contains::<GrownStrand>());
+                }
             }
             Err(error) => {
                 let outcome = "nothing is grown from this groom";

@@ -6,6 +6,7 @@ mod files;
 mod gltf;
 mod malformed;
 mod odd;
+mod reload;
 mod reshape;
 mod tressfx;
 mod worn;
