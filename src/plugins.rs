@@ -42,6 +42,7 @@ use bevy::{
 /// | [`CutPlugin`] | cuts hair | strands |
 /// | [`RollbackPlugin`] | registers snapshots for rollback | |
 /// | [`LookPlugin`] | registers colour, width and dye | |
+/// | [`ReportPlugin`](crate::debug::ReportPlugin) | fills `HairReport`s where there are any | strands |
 /// | `HairRenderPlugin` | draws hair and droplets | feature `render`, strands, Bevy's renderer |
 /// | `HairGpuPlugin` | simulates hair by compute shaders | feature `gpu`, strands, `BondPlugin`, Bevy's renderer |
 /// | `SavePlugin` | captures and applies hairdos | feature `save`, strands, `BondPlugin` |
@@ -117,7 +118,8 @@ impl PluginGroup for HairPlugins {
             .add(TiePlugin)
             .add(CutPlugin)
             .add(RollbackPlugin)
-            .add(LookPlugin);
+            .add(LookPlugin)
+            .add(crate::debug::ReportPlugin);
         #[cfg(feature = "render")]
         let group = group.add(crate::render::HairRenderPlugin {
             interpolate: self.schedule.is_none_or(crate::base::schedule::is_fixed),

@@ -11,8 +11,9 @@ pub mod wear;
 pub mod prelude {
     pub use crate::authoring::attach::RootsOnBones;
     pub use crate::authoring::groom::{
-        BonesFile, Groom, GroomError, GroomFileError, GroomGuides, GroomLoss, GroomLosses,
-        GroomPlace, GroomSettings, GroomedHair, RootBones, RootEnd, StrandBones, UpAxis,
+        BonesFile, Groom, GroomError, GroomFileError, GroomGroup, GroomGuides, GroomLoss,
+        GroomLosses, GroomPlace, GroomSettings, GroomedHair, RootBones, RootEnd, StrandBones,
+        UpAxis,
     };
     pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
     #[cfg(feature = "render")]

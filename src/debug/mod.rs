@@ -1,6 +1,7 @@
-//! What is going on: numbers for Bevy's diagnostics, and lines drawn over the scene.
+//! What is going on: numbers for Bevy's diagnostics, lines drawn over the scene, and [`HairReport`]s of single hairs.
 //!
-//! Neither plugin is part of [`HairPlugins`](crate::HairPlugins); without them nothing is measured.
+//! Neither [`HairDiagnosticsPlugin`] nor `HairDebugPlugin` is part of [`HairPlugins`](crate::HairPlugins); without them
+//! nothing is measured.
 //!
 //! ```
 //! use bevy::{diagnostic::LogDiagnosticsPlugin, prelude::*};
@@ -19,10 +20,12 @@ mod config;
 mod diagnostics;
 #[cfg(feature = "debug")]
 mod gizmos;
+mod report;
 #[cfg(feature = "debug")]
 mod shapes;
 
 pub use diagnostics::HairDiagnosticsPlugin;
+pub use report::{HairReport, HairReports, ReportPlugin, WhyMoved};
 #[cfg(feature = "debug")]
 pub use {config::HairGizmos, gizmos::HairDebugPlugin};
 
@@ -31,9 +34,9 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
-    pub use crate::debug::HairDiagnosticsPlugin;
     #[cfg(feature = "debug")]
     pub use crate::debug::{HairDebugPlugin, HairGizmos};
+    pub use crate::debug::{HairDiagnosticsPlugin, HairReport, HairReports, WhyMoved};
 }
 
 /// What moves a strand: its hair's [`MotionOwner`], and within that its own sleep.

@@ -113,6 +113,8 @@ pub enum Unsupported {
     Settling,
     /// Its [`HairStyle`](crate::HairStyle) is watched.
     WatchedStyle,
+    /// Strands that are stiffer or softer than others ([`StrandStiffness`](crate::StrandStiffness)).
+    StrandStiffness,
     /// Its strands count the wind that they receive ([`WindReceived`](crate::WindReceived)).
     WindReceived,
     /// A treatment of single strands, or of more than eight ranges of joints.
@@ -166,6 +168,7 @@ impl fmt::Display for Unsupported {
             Self::LevelOfDetail => "at its level of detail other strands are simulated, or none",
             Self::Settling => "it is still settling",
             Self::WatchedStyle => "its style is watched",
+            Self::StrandStiffness => "strands of their own stiffness are not supported there",
             Self::WindReceived => "the wind that it receives is counted",
             Self::Treatments => "treatments of single strands are not supported there",
             Self::Strands => "it has no strands that can be simulated",

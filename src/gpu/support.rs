@@ -20,7 +20,10 @@ use crate::{
         style::HairStyle,
         tie::{TieProgress, Tied},
     },
-    keratin::treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
+    keratin::{
+        bond::StrandStiffness,
+        treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
+    },
     simulation::{
         lod::{Guides, PresentLod},
         settle::Settling,
@@ -74,6 +77,7 @@ pub(super) struct Support<'w, 's> {
     tied: Query<'w, 's, (&'static StrandOf, &'static TieProgress), With<Tied>>,
     rods: Query<'w, 's, (), With<PermRod>>,
     counted: Query<'w, 's, &'static StrandOf, With<WindReceived>>,
+    stiff: Query<'w, 's, (&'static StrandOf, &'static StrandStiffness)>,
     disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
     #[cfg(feature = "groom")]
     on_mesh: Query<'w, 's, (Ref<'static, RootsOnMesh>, &'static TiedRoots)>,
@@ -98,6 +102,8 @@ impl Support<'_, '_> {
         let begins = self.tied.iter().filter(|(_, tie)| tie.waits());
         found.extend(begins.map(|(of, _)| (of.0, Unsupported::Winding)));
         found.extend(self.counted.iter().map(|of| (of.0, Unsupported::WindReceived)));
+        let stiff = self.stiff.iter().filter(|(_, own)| own.share != 1.0);
+        found.extend(stiff.map(|(of, _)| (of.0, Unsupported::StrandStiffness)));
         found.extend(self.disabled.iter().map(|of| (of.0, Unsupported::Strands)));
         found
     }

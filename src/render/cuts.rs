@@ -2,70 +2,27 @@
 
 use super::{
     curve::{Guide, strand_point},
-    draw::{Packed, guide_root},
-    drawn_strand::{DrawnStrand, GuideEnd},
-    follower_roots::FollowerRoots,
+    drawn_strand::DrawnStrand,
     followers::HairFollowers,
-    scatter::{LEAST, WHOLE, scatter, shorten},
+    present::PresentHair,
+    scatter::{LEAST, WHOLE},
 };
 use crate::{
-    base::{
-        parallel::{Nanos, for_each},
-        setting::Settings,
-    },
-    hair::strand::{CutStrand, FollowerCuts, Strand},
+    base::parallel::{Nanos, for_each},
+    hair::strand::FollowerCuts,
     hairdo::cut::{CutBy, HairCut},
-    water::Moisture,
 };
 use bevy::prelude::*;
 
 /// Cuts the followers of a hair as its guides have been.
-pub(super) fn cut_followers(
-    cut: On<HairCut>,
-    hairs: Query<(&Packed, Option<&FollowerRoots>, Option<&FollowerCuts>)>,
-    settings: Settings<HairFollowers>,
-    strands: Query<(&Strand, Option<&CutStrand>, Option<&Moisture>)>,
-    mut commands: Commands,
-) {
+pub(super) fn cut_followers(cut: On<HairCut>, drawn: PresentHair, mut commands: Commands) {
     let HairCut { hair, by, region, .. } = *cut;
-    let Ok((packed, follower_roots, cuts)) = hairs.get(hair) else { return };
-    let guides = packed.guides().map_while(|guide| {
-        let (strand, cut, water) = strands.get(guide).ok()?;
-        Some((strand, cut.filter(|cut| cut.fits(strand.nodes())), water))
-    });
-    let guides: Vec<_> = guides.collect();
-    let settings = settings.of(hair);
-    if guides.is_empty() || guides.len() != packed.guides().len() {
-        return;
-    }
-    let roots = packed.known_roots(follower_roots).map_or_else(
-        || guides.iter().map(|(strand, cut, _)| guide_root(strand, *cut)).collect(),
-        <[_]>::to_vec,
-    );
-    let end = |(strand, cut, _): &(&Strand, Option<&CutStrand>, Option<&Moisture>)| {
-        cut.map_or_else(|| GuideEnd::whole(strand.nodes() as u32), GuideEnd::from)
-    };
-    let ends: Vec<_> = guides.iter().map(end).collect();
-    let mut drawn = scatter(&roots, follower_roots, &settings);
-    let count = drawn.len() - ends.len();
-    let before = cuts.filter(|cuts| cuts.0.len() == count).cloned();
-    shorten(
-        &mut drawn,
-        &ends,
-        Some(&before.unwrap_or_else(|| FollowerCuts(vec![u16::MAX; count]))),
-    );
-    let guide = |i: u32| {
-        let (strand, cut, water) = guides[i as usize];
-        Guide {
-            nodes: strand.positions(),
-            moisture: water.map_or(&[], Moisture::sheen),
-            end: cut.map(GuideEnd::from),
-        }
-    };
-    let followers = &mut drawn[ends.len()..];
-    for_each(followers, Nanos(5_000), |follower| {
-        if region.contains(follower.place(&roots)) {
-            follower.cut = cut_at(follower, guide, &settings, &by);
+    let Some(present) = drawn.to_cut(hair) else { return };
+    let mut followers = present.strands[present.roots.len()..].to_vec();
+    let guide = |i: u32| present.guide(i);
+    for_each(&mut followers, Nanos(5_000), |follower| {
+        if region.contains(follower.place(&present.roots)) {
+            follower.cut = cut_at(follower, guide, &present.settings, &by);
         }
     });
     let ends = followers.iter().map(|own| (own.cut * WHOLE).round() as u16);

@@ -361,14 +361,15 @@ pub(super) fn guide_root(strand: &Strand, cut: Option<&CutStrand>) -> GuideRoot 
 }
 
 impl Packed {
-    /// The guides that are drawn.
-    pub(super) fn guides(&self) -> impl ExactSizeIterator<Item = Entity> + '_ {
-        self.layout.iter().map(|guide| guide.strand)
-    }
-
     /// The roots of guides that the roots of followers refer to.
     pub(super) fn known_roots(&self, followers: Option<&FollowerRoots>) -> Option<&[GuideRoot]> {
         (followers.is_some() && !self.roots.is_empty()).then_some(&self.roots)
+    }
+
+    /// The roots of guides by which followers are laid out.
+    #[cfg(feature = "groom")]
+    pub(super) fn laid_out(&self) -> Option<&[GuideRoot]> {
+        (!self.roots.is_empty()).then_some(&self.roots)
     }
 
     /// Straight segments of each drawn strand.

@@ -10,7 +10,7 @@ use super::{
     ribbon_mesh::{RibbonLevel, RibbonMeshes},
     rings::RoomForRings,
     screen_share::pixel_in,
-    solids::{Ball, DrawnSolid, arrange},
+    solids::{Ball, DrawnSolid, arrange, gather},
     view::HairView,
     volume::{self, BrightLights, HairVolume},
 };
@@ -104,12 +104,7 @@ pub(super) fn prepare(
         let nearest = lights.at(center, inside.1.length() * scale);
         frame.packed.set_volume(frame.volume, nearest, &from_world);
         solids.clear();
-        let near = balls.iter().filter(|ball| ball.is_near(inside, &hair_place));
-        solids.extend(near.filter_map(|ball| {
-            let (_, of, at) = colliders.get(ball.collider).ok()?;
-            let holds = obstacles.is_some_and(|obstacles| obstacles.is_held_by(ball.collider));
-            DrawnSolid::new(&of.shape, &(from_world * at.affine()), holds)
-        }));
+        gather(&mut solids, &balls, inside, place, &colliders, obstacles);
         arrange(&mut solids);
         frame.packed.set_solids(&solids);
         // New buffers are uploaded with their contents.

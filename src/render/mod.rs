@@ -60,6 +60,8 @@ mod cuts;
 mod depth;
 mod detail;
 mod draw;
+#[cfg(feature = "groom")]
+mod drawn_curves;
 mod drawn_strand;
 mod elsewhere;
 mod expand;
@@ -71,6 +73,7 @@ mod kernel;
 mod locks;
 mod material;
 mod packed_frame;
+mod present;
 mod ribbon_mesh;
 mod rings;
 mod scatter;
@@ -88,6 +91,8 @@ mod wet_look;
 pub use beads::{Bead, HairBeadSystems, HairBeads};
 pub use buffers::HairBuffers;
 pub use detail::HairDetail;
+#[cfg(feature = "groom")]
+pub(crate) use drawn_curves::DrawnCurves;
 pub use drawn_strand::{DrawnStrand, LockOffset};
 #[cfg(feature = "gpu")]
 pub(crate) use elsewhere::DrawnElsewhere;

@@ -3,7 +3,7 @@
 
 use crate::{
     base::grid::compact_groups,
-    forces::contact::{ColliderShape, HairCollider},
+    forces::contact::{ColliderShape, HairCollider, Obstacles},
 };
 use bevy::{math::Affine3A, prelude::*};
 
@@ -161,6 +161,24 @@ pub fn arrange(solids: &mut Vec<DrawnSolid>) {
     let small = solids.split_off(solids.len().min(BLOCKERS));
     let centers: Vec<Vec3> = small.iter().map(DrawnSolid::center).collect();
     solids.extend(compact_groups(&centers, GROUP).into_iter().map(|i| small[i as usize]));
+}
+
+/// Adds the solids that may touch what is in a box, of middle and half its size, in the frame of a hair at `place`.
+pub(super) fn gather(
+    solids: &mut Vec<DrawnSolid>,
+    balls: &[Ball],
+    inside: (Vec3, Vec3),
+    place: &GlobalTransform,
+    colliders: &Query<(Entity, &HairCollider, &GlobalTransform)>,
+    obstacles: Option<&Obstacles>,
+) {
+    let (hair, from_world) = (place.affine(), place.affine().inverse());
+    let near = balls.iter().filter(|ball| ball.is_near(inside, &hair));
+    solids.extend(near.filter_map(|ball| {
+        let (_, of, at) = colliders.get(ball.collider).ok()?;
+        let holds = obstacles.is_some_and(|obstacles| obstacles.is_held_by(ball.collider));
+        DrawnSolid::new(&of.shape, &(from_world * at.affine()), holds)
+    }));
 }
 
 /// A ball around some solids: its middle and radius.

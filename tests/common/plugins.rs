@@ -7,6 +7,7 @@ use bevy_keratin::{
         plant::PlantPlugin, wear::WearPlugin,
     },
     base::schedule::TickPlugin,
+    debug::ReportPlugin,
     forces::{contact::ContactPlugin, environment::EnvironmentPlugin},
     gpu::HairGpuPlugin,
     hair::{look::LookPlugin, strand::StrandPlugin},
@@ -35,7 +36,7 @@ macro_rules! switches {
 }
 
 /// All of the group.
-pub const ALL: [(&str, Switch); 25] = switches![
+pub const ALL: [(&str, Switch); 26] = switches![
     TickPlugin,
     StrandPlugin,
     BondPlugin,
@@ -53,6 +54,7 @@ pub const ALL: [(&str, Switch); 25] = switches![
     CutPlugin,
     RollbackPlugin,
     LookPlugin,
+    ReportPlugin,
     HairRenderPlugin,
     HairGpuPlugin,
     SavePlugin,

@@ -3,6 +3,8 @@
 #[cfg(feature = "render")]
 use super::GroomStrand;
 use super::{Groom, GroomError, RootBones};
+#[cfg(feature = "save")]
+use crate::hairdo::save::Regrowth;
 use crate::{
     authoring::attach::RootsOnBones,
     base::{
@@ -11,6 +13,7 @@ use crate::{
         setting::{Ranged, ValueRange, setting},
     },
     hair::strand::{Hair, Strand, StrandOf, Strands},
+    keratin::bond::StrandStiffness,
 };
 use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 
@@ -19,13 +22,18 @@ use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 ///
 /// The groom's origin becomes the entity's: see [`GroomSettings::origin`](super::GroomSettings::origin).
 /// Roots of a groom with [bones](Groom::bones) follow these: see [`RootsOnBones`].
-/// Changing this component, or reloading the asset, makes the hair again; removing it despawns it.
+/// Changing this component, or reloading the asset, makes the hair again; removing it despawns it. Where the groom is the
+/// same asset, what has been done to the hair stays (feature `save`): each strand takes it over from the one of its
+/// number, or where there are more or fewer from the nearest one. It is what differs from how the strand grew: the bonds'
+/// memory and rates, pose, water, ties, the share of its [`HairStyle`](crate::HairStyle) that is left. Hair that was cut has
+/// the lengths of the groom again.
 /// A groom that cannot be used is reported as a [`HairFault`].
 ///
 /// With the feature `render` all strands that are not guides become
 /// [`FollowerRoots`](crate::render::FollowerRoots), and a hair without
 /// [`HairLook`](crate::render::HairLook) takes the groom's mean colour and width, if it has them.
-/// Widths and colours of single nodes stay in the asset.
+/// A strand that is drawn between guides is as wide beside the others as its mean width is; widths and colours of single
+/// nodes stay in the asset. Guides of a groom with [stiffness](Groom::with_stiffness) have theirs.
 ///
 /// ```
 /// # use bevy_keratin::{prelude::*, authoring::groom::*}; use bevy::prelude::*;
@@ -127,11 +135,12 @@ impl Groom {
         }
         #[cfg(feature = "render")]
         commands.entity(hair).try_insert(grown_strands.followers);
-        Ok(grown_strands
-            .strands
-            .into_iter()
-            .map(|s| commands.spawn((StrandOf(hair), s)).id())
-            .collect())
+        let strands = grown_strands.strands.into_iter();
+        let strands: Vec<Entity> =
+            strands.map(|strand| commands.spawn((StrandOf(hair), strand)).id()).collect();
+        let own = grown_strands.stiffness.into_iter().map(|share| StrandStiffness { share });
+        commands.insert_batch(strands.iter().copied().zip(own).collect::<Vec<_>>());
+        Ok(strands)
     }
 
     /// The strands and followers that [`Groom::spawn`] spawns.
@@ -151,11 +160,12 @@ impl Groom {
         let coarse = self.picked(chosen.iter().copied());
         let coarse = coarse.resampled_by(|length| guides.nodes_of(length))?;
         let mut bones = RootBones { names: coarse.bones.names.clone(), ..default() };
-        let mut strands = Vec::with_capacity(coarse.len());
+        let (mut strands, mut stiffness) = (Vec::with_capacity(coarse.len()), Vec::new());
         for (i, line) in coarse.strands().enumerate() {
             if let Ok(strand) = Strand::from_polyline(line.points) {
                 strands.push(strand);
                 bones.strands.extend(coarse.bones.strands.get(i));
+                stiffness.extend(line.stiffness);
             }
         }
         if strands.is_empty() {
@@ -167,6 +177,7 @@ impl Groom {
             bones: is_bound.then(|| RootsOnBones { roots: roots(), bones, ..default() }),
             short: chosen.len() - strands.len(),
             strands,
+            stiffness,
             #[cfg(feature = "render")]
             followers: self.followers_of(&chosen),
         })
@@ -178,9 +189,13 @@ impl Groom {
         let mut is_guide = vec![false; self.len()];
         guides.iter().for_each(|i| is_guide[*i] = true);
         let others = self.strands().zip(&is_guide).filter(|(_, guide)| !**guide);
+        let mean = self.mean_width().filter(|mean| *mean > 0.0);
         let root = |strand: GroomStrand<'_>| {
             let (root, tip) = (strand.points[0], strand.points[strand.points.len() - 1]);
-            FollowerRoot { place: root, length: strand.length(), reach: tip - root, ..default() }
+            let widths = strand.widths.unwrap_or_default();
+            let own = widths.iter().sum::<f32>() / widths.len().max(1) as f32;
+            let width = mean.filter(|_| !widths.is_empty()).map_or(1.0, |mean| own / mean);
+            FollowerRoot { place: root, length: strand.length(), reach: tip - root, width }
         };
         FollowerRoots(others.map(|(strand, _)| root(strand)).collect())
     }
@@ -191,6 +206,8 @@ impl Groom {
 pub(crate) struct GrownStrands {
     /// The guides.
     pub strands: Vec<Strand>,
+    /// How stiff each is beside the others; empty where all are alike.
+    pub stiffness: Vec<f32>,
     /// What their roots follow, if the groom says so.
     pub bones: Option<RootsOnBones>,
     /// All other strands.
@@ -271,6 +288,13 @@ fn spawn_grown(
             }
             continue;
         };
+        // The same groom, changed: what has been done to the hair stays.
+        #[cfg(feature = "save")]
+        let regrowth = (grown.from.as_ref())
+            .filter(|before| before.groom == wanted.groom && members.is_some())
+            .map(|_| {
+                Regrowth::take(&mut commands, hair, |strand| strand.contains::<GrownStrand>())
+            });
         let has_look = has_look && !grown.gave_look;
         grown.take_off(&mut commands, hair, members, &own);
         grown.from = Some(wanted.clone());
@@ -282,6 +306,10 @@ fn spawn_grown(
             Ok(strands) => {
                 let marked = strands.into_iter().map(|strand| (strand, GrownStrand));
                 commands.insert_batch(marked.collect::<Vec<_>>());
+                #[cfg(feature = "save")]
+                if let Some(regrowth) = regrowth {
+                    regrowth.put_on(&mut commands, hair, |of| of.contains::<GrownStrand>());
+                }
             }
             Err(error) => {
                 let outcome = "nothing is grown from this groom";

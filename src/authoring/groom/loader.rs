@@ -1,8 +1,8 @@
 //! Grooms as assets.
 
 use super::{
-    BonesFile, Groom, GroomError, GroomFileError, GroomFormat, GroomLoss, GroomLosses, GroomPlace,
-    GroomSettings, OddSize, RootBones, RootEnd, StrandBones, alembic, gltf, grown_hair,
+    BonesFile, Groom, GroomError, GroomFileError, GroomFormat, GroomGroup, GroomLoss, GroomLosses,
+    GroomPlace, GroomSettings, OddSize, RootBones, RootEnd, StrandBones, alembic, gltf, grown_hair,
     intake::Intake, ply, salon, tressfx, yuksel,
 };
 use bevy::{
@@ -225,6 +225,7 @@ impl Plugin for GroomPlugin {
             .register_type::<StrandBones>()
             .register_type::<BonesFile>()
             .register_type::<GroomError>()
+            .register_type::<GroomGroup>()
             .register_type::<OddSize>();
         grown_hair::build(app);
         add_loader(app);

@@ -6,6 +6,8 @@
 pub mod alembic;
 mod bones;
 mod bytes;
+#[cfg(feature = "render")]
+mod drawn;
 mod foreign;
 mod format;
 pub mod gltf;
@@ -37,7 +39,7 @@ pub use roots::RootEnd;
 pub use settings::GroomSettings;
 pub use size::OddSize;
 
-use crate::base::setting::InvalidValue;
+use crate::{base::setting::InvalidValue, keratin::bond::StrandStiffness};
 use bevy::prelude::*;
 use shared::Shared;
 
@@ -53,7 +55,34 @@ pub struct Groom {
     colors: Shared<LinearRgba>,
     uvs: Shared<Vec2>,
     guides: Shared<bool>,
+    stiffness: Shared<f32>,
+    /// Indices into `all_groups`, or beyond them.
+    groups: Shared<u32>,
+    all_groups: Shared<GroomGroup>,
     bones: RootBones,
+}
+
+/// A group of strands, as files have them: hair of one name or number, such as a fringe, a beard or the left half of a
+/// head. By [`Groom::with_groups`].
+#[derive(Reflect, Clone, Debug, Default, PartialEq, Eq)]
+#[reflect(Default, Clone, PartialEq)]
+pub struct GroomGroup {
+    /// Its number in the file, in Alembic `groom_group_id`; 0 where there is none.
+    pub id: i32,
+    /// Its name, in Alembic `groom_group_name`, else that of the curves.
+    pub name: String,
+    /// Where its curves are in the file, such as `/groom/Head/Fringe/Fringe`; empty where the format has no names.
+    pub path: String,
+}
+
+impl GroomGroup {
+    /// What the hair grows on by the names of the file, as the add-on for Blender writes them:
+    /// `/groom/HEAD/HAIR/HAIR`; `None` by another path.
+    pub fn head(&self) -> Option<&str> {
+        let mut names = self.path.strip_prefix("/groom/")?.split('/');
+        let head = names.next()?;
+        (names.count() == 2).then_some(head)
+    }
 }
 
 /// One strand of a [`Groom`].
@@ -69,6 +98,10 @@ pub struct GroomStrand<'a> {
     pub uv: Option<Vec2>,
     /// Whether it is marked as a guide: see [`Groom::with_guides`].
     pub is_guide: bool,
+    /// How stiff it is, if given: see [`Groom::with_stiffness`].
+    pub stiffness: Option<f32>,
+    /// The group that it is in, if there are any.
+    pub group: Option<&'a GroomGroup>,
 }
 
 /// Why data cannot be a [`Groom`].
@@ -137,6 +170,9 @@ pub enum GroomError {
          short, or its scale is too small"
     )]
     Empty,
+    /// An entity that neither is hair nor wears any.
+    #[error("the entity is no Hair and wears none, expected one of these: ask after HairWorn")]
+    NoHair,
     /// Every strand was left out.
     #[error("no strand is left, expected 1 or more: {losses}; repair the source")]
     AllLeftOut {
@@ -171,6 +207,7 @@ impl Groom {
     const WIDTH: &str = "width (m)";
     const COLOUR: &str = "colour";
     const UV: &str = "UV";
+    const STIFFNESS: &str = "stiffness";
 
     /// A groom of these polylines (m), root first.
     ///
@@ -243,6 +280,48 @@ impl Groom {
         self.checked()
     }
 
+    /// The groom with a stiffness for each strand, as a share of that of its hair: strands that are simulated get
+    /// [`StrandStiffness`], all others follow them. Alembic has it as the attribute `groom_stiffness`.
+    ///
+    /// ```
+    /// # use bevy_keratin::{prelude::*, authoring::groom::*};
+    /// /// A fringe that is half as stiff as the other groups.
+    /// fn soft_fringe(groom: Groom) -> Result<Groom, GroomError> {
+    ///     let share = |strand: GroomStrand| match strand.group.map(|group| group.name.as_str()) {
+    ///         Some("fringe") => 0.5,
+    ///         _ => 1.0,
+    ///     };
+    ///     let shares = groom.strands().map(share).collect();
+    ///     groom.with_stiffness(shares)
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// When there are not as many as strands, or one is outside [`StrandStiffness::SHARE`].
+    pub fn with_stiffness(mut self, shares: Vec<f32>) -> Result<Self, GroomError> {
+        self.stiffness = shares.into();
+        self.checked()
+    }
+
+    /// The groom with groups, and for each strand the index of its own; an index that none has is no group.
+    ///
+    /// # Errors
+    /// When there are not as many indices as strands.
+    pub fn with_groups(
+        mut self,
+        groups: Vec<GroomGroup>,
+        of_strands: Vec<u32>,
+    ) -> Result<Self, GroomError> {
+        (self.all_groups, self.groups) = (groups.into(), of_strands.into());
+        self.checked()
+    }
+
+    /// The groups of its strands, in the order of the file; none where the file has none. [`GroomStrand::group`] says
+    /// which a strand is in.
+    pub fn groups(&self) -> &[GroomGroup] {
+        &self.all_groups
+    }
+
     /// The groom with the bones that its roots follow: hair grown from it gets
     /// [`RootsOnBones`](crate::authoring::attach::RootsOnBones).
     ///
@@ -273,6 +352,8 @@ impl Groom {
         fits("colors", self.colors.len(), self.points.len())?;
         fits("uvs", self.uvs.len(), self.len())?;
         fits("guides", self.guides.len(), self.len())?;
+        fits("stiffness", self.stiffness.len(), self.len())?;
+        fits("groups", self.groups.len(), self.len())?;
         fits("bones", self.bones.strands.len(), self.len())?;
         self.check_bones()?;
         self.strands().enumerate().try_for_each(|(i, strand)| strand.check(i))
@@ -339,6 +420,8 @@ impl Groom {
             colors: self.colors.get(nodes).filter(|_| !self.colors.is_empty()),
             uv: self.uvs.get(i).copied(),
             is_guide: self.guides.get(i) == Some(&true),
+            stiffness: self.stiffness.get(i).copied(),
+            group: self.groups.get(i).and_then(|group| self.all_groups.get(*group as usize)),
         }
     }
 }
@@ -370,6 +453,11 @@ impl GroomStrand<'_> {
             if let Some(part) = parts.into_iter().find(|part| !part.is_finite()) {
                 return wrong(Groom::COLOUR, at, part, "finite numbers");
             }
+        }
+        if let Some(share) = self.stiffness
+            && StrandStiffness::SHARE.check(share).is_err()
+        {
+            return wrong(Groom::STIFFNESS, 0, share, "a share of 0.01 to 100");
         }
         let uv = self.uv.unwrap_or_default().to_array();
         match uv.into_iter().find(|part| !part.is_finite()) {

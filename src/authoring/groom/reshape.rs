@@ -181,7 +181,8 @@ impl Groom {
     /// An empty groom with capacity for as many strands.
     fn emptied(&self) -> Self {
         let bones = RootBones { names: self.bones.names.clone(), ..default() };
-        Self { ends: Vec::with_capacity(self.len()).into(), bones, ..default() }
+        let (ends, all_groups) = (Vec::with_capacity(self.len()).into(), self.all_groups.clone());
+        Self { ends, all_groups, bones, ..default() }
     }
 
     fn push_node(&mut self, of: &GroomStrand<'_>, i: usize) {
@@ -204,6 +205,8 @@ impl Groom {
         self.ends.push(u32::try_from(found).map_err(|_| GroomError::TooMany { found })?);
         self.uvs.extend(of.uvs.get(i));
         self.guides.extend(of.guides.get(i));
+        self.stiffness.extend(of.stiffness.get(i));
+        self.groups.extend(of.groups.get(i));
         self.bones.strands.extend(of.bones.strands.get(i));
         Ok(())
     }

@@ -151,6 +151,8 @@ pub(super) struct MadeHair {
     pub(super) roots: Vec<RootOnMesh>,
     /// Its strands at rest, with their bonds, how they fell if that was found out, and what was reported meanwhile.
     pub(super) strands: Vec<(Strand, Bonds)>,
+    /// How stiff each is beside the others; empty where all are alike.
+    pub(super) stiffness: Vec<f32>,
     pub(super) fall: Option<Arc<Fall>>,
     /// Whether it took over how other hair lay.
     pub(super) is_carried: bool,
@@ -365,6 +367,7 @@ fn finish(
     MadeHair {
         roots: grown.roots,
         strands: rested.strands,
+        stiffness: grown.hair.stiffness,
         fall,
         is_carried,
         faults: rested.faults,
@@ -424,6 +427,7 @@ fn settle(
     let down = fitting.from_wearer.transform_vector3(order.down()) / scale;
     let ahead = SettleAhead {
         strands: &grown.hair.strands,
+        stiffness: &grown.hair.stiffness,
         own: grown.settings.as_ref().map(|settings| (settings.stiffness, settings.contact)),
         solids: &solids,
         size: size / scale,

@@ -10,6 +10,8 @@ use super::{
     target::{Characters, Fitted, Search, Target},
     what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs},
 };
+#[cfg(feature = "save")]
+use crate::hairdo::save::Regrowth;
 use crate::{
     authoring::{
         attach::{OtherMesh, RootsOnMesh, TiedRoots},
@@ -25,6 +27,7 @@ use crate::{
         worn::{PassedTypes, Wearer, WornBy, WornHair},
     },
     hairdo::style::{HairStyle, KeptStyle},
+    keratin::bond::StrandStiffness,
     simulation::settle::{SettleConditions, Settled, Settling},
     water::HairWetting,
 };
@@ -545,6 +548,8 @@ impl Hairdresser<'_, '_> {
         }
         log_made(wearer, &made);
         let before = core::mem::take(&mut wearing.worn);
+        #[cfg(feature = "save")]
+        let mut regrowths = self.regrowths(&before, wearing.wanted.as_ref().unwrap_or(wear), kept);
         let gone = before.iter().map(|worn| worn.hair).filter(|hair| !kept.contains(&Some(*hair)));
         despawn_worn(&mut self.commands, wearer, gone, &self.fitted);
         #[cfg(feature = "render")]
@@ -559,13 +564,20 @@ impl Hairdresser<'_, '_> {
             let worn = match (new, kept) {
                 (Some(new), _) => {
                     let fall = new.fall.clone();
-                    Worn {
+                    #[cfg(feature = "save")]
+                    let regrowth = regrowths.get_mut(which).and_then(Option::take);
+                    let worn = Worn {
                         is_carried: new.is_carried,
                         fall: fall.or_else(|| before.get(which)?.fall.clone()),
                         // A groom that was loaded again meanwhile.
                         is_stale: wearing.lags && matches!(wear.hair, HairSource::Groom { .. }),
                         hair: self.spawn(wearer, &made, new, wear, which),
+                    };
+                    #[cfg(feature = "save")]
+                    if let Some(regrowth) = regrowth {
+                        regrowth.put_on(&mut self.commands, worn.hair, |_| true);
                     }
+                    worn
                 }
                 (None, Some(hair)) => {
                     let Ok((mut is, place)) = self.hairs.get_mut(*hair) else { continue };
@@ -589,6 +601,23 @@ impl Hairdresser<'_, '_> {
         let beside = hairs.collect();
         let event = HairWorn { entity: wearer, hair, beside, mesh, facing, facing_from };
         self.commands.trigger(event);
+    }
+
+    /// What has been done to hair whose groom is loaded again, or is otherwise made anew as it was.
+    #[cfg(feature = "save")]
+    fn regrowths(
+        &mut self,
+        before: &[Worn],
+        wanted: &WearHair,
+        kept: &[Option<Entity>],
+    ) -> Vec<Option<Regrowth>> {
+        let taken = before.iter().zip(wanted.each()).zip(kept).map(|((worn, wear), kept)| {
+            let is_groom = matches!(wear.hair, HairSource::Groom { .. });
+            let (was, _) = self.hairs.get(worn.hair).ok()?;
+            let is_same = is_groom && kept.is_none() && was.wear.is_same_hair(&wear);
+            is_same.then(|| Regrowth::take(&mut self.commands, worn.hair, |_| true))
+        });
+        taken.collect()
     }
 
     /// Spawns a hair of what was made.
@@ -638,7 +667,13 @@ impl Hairdresser<'_, '_> {
         let hair = hair.id();
         let strands =
             new.strands.into_iter().map(move |(strand, bonds)| (StrandOf(hair), strand, bonds));
-        self.commands.spawn_batch(strands.collect::<Vec<_>>());
+        let strands = strands.collect::<Vec<_>>();
+        if new.stiffness.is_empty() {
+            self.commands.spawn_batch(strands);
+        } else {
+            let own = new.stiffness.into_iter().map(|share| StrandStiffness { share });
+            self.commands.spawn_batch(strands.into_iter().zip(own).collect::<Vec<_>>());
+        }
         let mut own = self.commands.entity(hair);
         #[cfg(feature = "save")]
         if let Some(hairdo) = wear.hairdo {

@@ -201,7 +201,7 @@ fn the_hair(world: &World, entity: Entity) -> Result<Entity, HairdoError> {
     }
 }
 
-fn members(world: &World, hair: Entity) -> Vec<Entity> {
+pub(super) fn members(world: &World, hair: Entity) -> Vec<Entity> {
     world.get::<Strands>(hair).into_iter().flat_map(Strands::iter).collect()
 }
 

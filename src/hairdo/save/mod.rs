@@ -22,12 +22,16 @@ mod events;
 mod holds;
 mod looks;
 mod plugin;
+#[cfg(feature = "groom")]
+mod regrown;
 mod resample;
 
 pub use bytes::NEWEST_FORMAT;
 pub use error::HairdoError;
 pub use events::{ApplyHairdo, CaptureHairdo, HairdoApplied, HairdoCaptured, HairdoRejected};
 pub use plugin::SavePlugin;
+#[cfg(feature = "groom")]
+pub(crate) use regrown::Regrowth;
 
 use crate::{
     base::setting::Ranged,

@@ -12,7 +12,7 @@ use bevy::prelude::*;
 
 /// The largest bend of a resampled joint, sin(θ/2): 150°. Beyond 180° it would bend to the other
 /// side.
-const MAX_BEND: f32 = 0.966;
+pub(super) const MAX_BEND: f32 = 0.966;
 
 impl Hairdo {
     /// Puts the hairdo on the hair of another groom, at rest; all strands, or in case of an error
@@ -39,6 +39,18 @@ impl Hairdo {
         self.resampled_for(&Self::of(world, hair)?)?.apply(world, hair)
     }
 
+    /// Which strand's style one of `count` others takes, by its index and root: of as many that of the same index, else
+    /// that of the nearest root.
+    pub(super) fn sources(&self, count: usize) -> impl Fn(usize, Vec3) -> usize + use<> {
+        let by_index = self.strands.len() == count;
+        let roots = self.strands.iter().map(|strand| strand.positions[0]).zip(0..);
+        let nearest = KdTree::new(roots.filter(|_| !by_index));
+        move |index, root| match by_index {
+            true => index,
+            false => nearest.nearest::<1>(root).next().map_or(0, |(i, _)| i as usize),
+        }
+    }
+
     /// The hairdo resampled for the groom of `other`: what [`Hairdo::apply_resampled`] applies.
     ///
     /// # Errors
@@ -47,14 +59,12 @@ impl Hairdo {
         if self.strands.is_empty() && !other.strands.is_empty() {
             return Err(HairdoError::Bald);
         }
-        let by_index = self.strands.len() == other.strands.len();
-        let roots = self.strands.iter().map(|strand| strand.positions[0]).zip(0..);
-        let nearest = KdTree::new(roots.filter(|_| !by_index));
-        let of = |place| nearest.nearest::<1>(place).next().map_or(0, |(i, _)| i as usize);
-        let strands = other.strands.iter().enumerate().map(|(i, layout)| {
-            let source = if by_index { i } else { of(layout.positions[0]) };
-            self.strands[source].resampled(layout)
-        });
+        let of = self.sources(other.strands.len());
+        let strands = other
+            .strands
+            .iter()
+            .enumerate()
+            .map(|(i, layout)| self.strands[of(i, layout.positions[0])].resampled(layout));
         let (strands, preset) = (strands.collect(), other.preset.clone());
         let (look, dye) = (self.look.clone(), self.dye.clone());
         let (ties, followers) = (self.ties.clone(), other.followers.clone());
@@ -64,7 +74,7 @@ impl Hairdo {
 
 impl StyledStrand {
     /// The style of `self` with root, lengths and number of nodes of `layout`.
-    fn resampled(&self, layout: &Self) -> Self {
+    pub(super) fn resampled(&self, layout: &Self) -> Self {
         let lengths = &layout.rest_lengths;
         if (&self.rest_lengths, self.root_frame) == (lengths, layout.root_frame) {
             let mut same = Self { cut: layout.cut, ..self.clone() };
@@ -119,7 +129,7 @@ impl StyledStrand {
 }
 
 /// Arc lengths along an old and a new strand, both in the old one's lengths.
-struct Along {
+pub(super) struct Along {
     old_nodes: Vec<f32>,
     old_middles: Vec<f32>,
     new_nodes: Vec<f32>,
@@ -129,7 +139,7 @@ struct Along {
 }
 
 impl Along {
-    fn new(old: &[f32], new: &[f32]) -> Self {
+    pub(super) fn new(old: &[f32], new: &[f32]) -> Self {
         let scale = new.iter().sum::<f32>() / old.iter().sum::<f32>();
         let measure = |lengths: &[f32], scale: f32| {
             let mut at = 0.0;
@@ -150,7 +160,12 @@ impl Along {
     /// bends by the curvature between two of them. |Im Ω| = sin(θ/2) is half the edge over the
     /// radius of the circle through the nodes: Ω per length, unlike the angle, keeps that radius
     /// exactly.
-    fn resample_shapes(&self, old_root: Quat, shapes: &[Vec3], new_root: Quat) -> Vec<Vec3> {
+    pub(super) fn resample_shapes(
+        &self,
+        old_root: Quat,
+        shapes: &[Vec3],
+        new_root: Quat,
+    ) -> Vec<Vec3> {
         let first = shapes.first().copied().unwrap_or_default();
         let onward = self.turn(shapes, self.old_middles[0], self.new_middles[0]);
         let first = darboux(new_root, old_root * full(first) * full(onward)).xyz();

@@ -76,7 +76,7 @@ pub struct KeptStyle {
 #[derive(Component, Reflect, Clone, Debug, Default)]
 #[component(storage = "SparseSet")]
 #[reflect(Component, Default, Clone)]
-struct StyledJoints(Vec<Vec3>);
+pub(crate) struct StyledJoints(pub(crate) Vec<Vec3>);
 
 impl KeptStyle {
     /// The share that is left: 1 when inserted, 0 when nothing is left, negative when hair bends

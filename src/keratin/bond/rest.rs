@@ -21,8 +21,9 @@ pub struct RestShape {
     /// Whether the shape stays until bonds change: with all bonds closed, and in the direct solver with
     /// any closed.
     pub(super) closed: bool,
-    /// The softening that the stiffness was computed with.
+    /// The softening that the stiffness was computed with, and the strand's own share.
     pub(super) softened: Vec<f32>,
+    pub(super) share: f32,
 }
 
 impl RestShape {

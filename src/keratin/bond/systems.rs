@@ -6,7 +6,7 @@ use super::{
     lanes::{JointFrames, change, remembered_shapes, rest_shapes},
     model::cuticle_factor,
     rest::{Key, RestShape},
-    settings::{BondInfluence, Cuticle},
+    settings::{BondInfluence, Cuticle, StrandStiffness},
 };
 use crate::{
     base::{
@@ -16,7 +16,7 @@ use crate::{
         schedule::{
             EffectiveSubsteps, HairSystems, HairTick, SettleTick, first_substep, last_substep,
         },
-        setting::{Ranged, Settings, Violations, report},
+        setting::{self, Ranged, Settings, Violations, report},
     },
     hair::{
         strand::{
@@ -47,6 +47,7 @@ impl Plugin for BondPlugin {
         }
         worn::setting::<BondInfluence>(app);
         worn::setting::<Cuticle>(app);
+        setting::component::<StrandStiffness>(app);
         keep_required::<Strand, Bonds>(app);
         keep_required::<Strand, BondChanges>(app);
         keep_required::<Strand, RestShape>(app);
@@ -109,7 +110,7 @@ fn fit_bonds<F: QueryFilter>(
 }
 
 /// A strand whose rest shape has to be updated.
-type Shaped<'a> = (Key, &'a Strand, &'a Bonds, &'a AddedMass, &'a mut RestShape);
+type Shaped<'a> = (Key, &'a Strand, &'a Bonds, (&'a AddedMass, f32), &'a mut RestShape);
 
 fn generate_rest_shapes(
     steps: EffectiveSubsteps,
@@ -118,7 +119,15 @@ fn generate_rest_shapes(
     cuticle: Settings<Cuticle>,
     solver: Settings<HairSolver>,
     mut strands: Query<
-        (&StrandOf, &StrandSleep, &Strand, Ref<Bonds>, &AddedMass, &mut RestShape),
+        (
+            &StrandOf,
+            &StrandSleep,
+            &Strand,
+            Ref<Bonds>,
+            &AddedMass,
+            &mut RestShape,
+            Option<&StrandStiffness>,
+        ),
         SimulatedHere,
     >,
 ) {
@@ -144,23 +153,25 @@ fn generate_rest_shapes(
     let level = simd_level();
     for_each_part(SHAPE, tables(&mut strands), Vec::new, |items, rows| {
         let mut keys = PerHair::default();
-        for (of, sleep, strand, (bonds, is_changed), added_mass, rest) in rows {
+        for (of, sleep, strand, (bonds, is_changed), added_mass, rest, own) in rows {
             if !sleep.is_simulated() {
                 continue;
             }
             let index = keys.index(of.0, || key_of(of.0));
             let Some(key) = index.map(|index| keys.values[index]) else { continue };
+            let share = own.map_or(1.0, |own| own.clamped().share);
             // Hair with all bonds closed, the usual case, costs only this test.
             if !rest.closed
                 || rest.key != Some(key)
+                || rest.share != share
                 || is_changed
                 || has_softened(&rest.softened, &added_mass.softening)
             {
-                items.push((key, strand, bonds, added_mass, rest));
+                items.push((key, strand, bonds, (added_mass, share), rest));
             }
         }
-        in_turn(items, AHEAD, ahead, |(key, strand, bonds, added_mass, rest)| {
-            shape(level, key, strand, bonds, added_mass, rest);
+        in_turn(items, AHEAD, ahead, |(key, strand, bonds, load, rest)| {
+            shape(level, key, strand, bonds, *load, rest);
         });
         items.clear();
     });
@@ -172,13 +183,15 @@ fn shape(
     key: &Key,
     strand: &Strand,
     bonds: &Bonds,
-    added_mass: &AddedMass,
+    (added_mass, share): (&AddedMass, f32),
     rest: &mut RestShape,
 ) {
     let joints = &bonds.joints;
     rest.closed = joints.iter().all(|joint| joint.rates == [1.0; BondKind::COUNT]);
     rest.darboux.resize(joints.len(), Quat::IDENTITY);
-    let is_other = rest.key != Some(*key) || has_softened(&rest.softened, &added_mass.softening);
+    let is_other = rest.key != Some(*key)
+        || rest.share != share
+        || has_softened(&rest.softened, &added_mass.softening);
     let changed = is_other || rest.stiffness.len() != strand.edges();
     match key.sweeps {
         None => {
@@ -191,7 +204,7 @@ fn shape(
         Some(_) => rest_shapes(level, frames(strand), joints, &key.influence, &mut rest.darboux),
     }
     if is_other {
-        rest.key = Some(*key);
+        (rest.key, rest.share) = (Some(*key), share);
         rest.softened.clone_from(&added_mass.softening);
     }
     if changed || key.sweeps.is_none() {
@@ -202,7 +215,7 @@ fn shape(
             let softened = rest.softened.get(i).copied().unwrap_or(0.0);
             let cuticle = cuticle_factor(distance, key.cuticle.damage, key.cuticle.softening);
             distance += length;
-            let factor = cuticle * (1.0 - softened);
+            let factor = cuticle * (1.0 - softened) * share;
             *stiffness = match key.sweeps {
                 None => *stiffness * factor,
                 Some((sweeps, dt)) => {
@@ -270,12 +283,12 @@ mod tests {
         let cuticle = Cuticle { damage: 4.0, softening: 0.5 };
         let influence = BondInfluence::default().as_array();
         let sweeps = Sweeps::default();
-        for key in [None, Some((sweeps, REFERENCE_DT))] {
+        for (key, share) in [(None, 1.0), (None, 4.0), (Some((sweeps, REFERENCE_DT)), 0.5)] {
             let key = Key { influence, cuticle, sweeps: key };
             let mut rest = RestShape::default();
-            shape(simd_level(), &key, &strand, &bonds, &added, &mut rest);
+            shape(simd_level(), &key, &strand, &bonds, (&added, share), &mut rest);
             for i in 0..4 {
-                let factor = cuticle_factor(places[i], 4.0, 0.5) * (1.0 - softening[i]);
+                let factor = share * cuticle_factor(places[i], 4.0, 0.5) * (1.0 - softening[i]);
                 let expected = match key.sweeps {
                     None => factor,
                     Some((s, dt)) => {

@@ -18,11 +18,6 @@ impl Follower {
 }
 
 impl PresentLod {
-    /// Whether any strand would be simulated without the [`HairBudget`](super::HairBudget).
-    pub(crate) fn wants_simulation(&self) -> bool {
-        self.wanted_strands.is_none_or(|share| share > 0.0)
-    }
-
     /// Sets whether the budget leaves it alone because it is about to be simulated elsewhere; returns
     /// whether that was so.
     pub(crate) fn set_leaving(&mut self, is_leaving: bool) -> bool {

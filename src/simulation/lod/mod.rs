@@ -155,6 +155,11 @@ impl PresentLod {
     pub(crate) fn simulated_share(&self) -> f32 {
         self.strands.unwrap_or(1.0)
     }
+
+    /// Whether any strand would be simulated without the [`HairBudget`](super::HairBudget).
+    pub(crate) fn wants_simulation(&self) -> bool {
+        self.wanted_strands.is_none_or(|share| share > 0.0)
+    }
 }
 
 impl LodLevel {

@@ -12,7 +12,7 @@ use crate::{
         environment::{AirDrag, EnvironmentPlugin, HairGravity},
     },
     hair::strand::{Hair, Strand, StrandModel, StrandOf, StrandPlugin},
-    keratin::bond::{BondInfluence, BondPlugin, Bonds, Cuticle},
+    keratin::bond::{BondInfluence, BondPlugin, Bonds, Cuticle, StrandStiffness},
     simulation::solve::{RodPlugin, SpringPlugin},
     solver::{
         mass_spring::Springs,
@@ -98,6 +98,8 @@ impl SettleConditions {
 pub(crate) struct SettleAhead<'a> {
     /// As planted, in the hair's frame.
     pub(crate) strands: &'a [Strand],
+    /// How stiff each is beside the others; empty where all are alike.
+    pub(crate) stiffness: &'a [f32],
     /// What the hair has of its own, whatever holds for all hair.
     pub(crate) own: Option<(HairStiffness, StrandContact)>,
     /// Colliders in the hair's frame.
@@ -176,6 +178,9 @@ impl SettleAhead<'_> {
         world.entity_mut(hair).insert(SettleSettings { at_once: AT_ONCE, ..settings });
         let strands = self.strands.iter().map(|strand| (StrandOf(hair), strand.clone()));
         let strands: Vec<Entity> = world.spawn_batch(strands.collect::<Vec<_>>()).collect();
+        for (strand, share) in strands.iter().zip(self.stiffness) {
+            world.entity_mut(*strand).insert(StrandStiffness { share: *share });
+        }
         for (collider, place) in self.solids {
             world.spawn((collider.clone(), *place, ChildOf(hair)));
         }

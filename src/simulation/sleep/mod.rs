@@ -21,7 +21,7 @@ mod systems;
 #[cfg(feature = "gpu")]
 pub(crate) use on_gpu::{Disturbance, watch_on_gpu};
 pub use systems::SleepPlugin;
-pub(crate) use systems::{Conditions, RestSettings, SleepSnapshot};
+pub(crate) use systems::{Conditions, RestSettings, SleepSnapshot, is_blown};
 
 use crate::base::setting::setting;
 use bevy::prelude::*;

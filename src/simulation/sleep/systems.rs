@@ -25,7 +25,7 @@ use crate::{
         worn,
     },
     keratin::{
-        bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle},
+        bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle, StrandStiffness},
         treatment::Treatments,
     },
     solver::{
@@ -65,7 +65,15 @@ impl Plugin for SleepPlugin {
             .register_required_components::<Hair, SleepSnapshot>()
             .register_required_components::<Hair, SleepCounts>()
             .init_resource::<TickColliders>()
+            .add_observer(wake_softer)
             .add_systems(HairTick, update_sleep.in_set(HairSystems::Sleep).run_if(first_substep));
+    }
+}
+
+/// A strand is as stiff as its hair again.
+fn wake_softer(lost: On<Remove, StrandStiffness>, mut strands: Query<&mut StrandSleep>) {
+    if let Ok(mut sleep) = strands.get_mut(lost.entity) {
+        sleep.bypass_change_detection().wake();
     }
 }
 
@@ -284,7 +292,7 @@ fn update_sleep(
             &mut Strand,
             &mut StrandSleep,
             &mut SleepPose,
-            (Ref<Bonds>, &BondChanges, &AddedMass),
+            (Ref<Bonds>, &BondChanges, &AddedMass, Option<Ref<StrandStiffness>>),
             (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
         ),
         // Followers sleep when their guides do.
@@ -330,11 +338,12 @@ fn update_sleep(
         }
     };
     let mut items: Vec<SleepCandidate<'_>> = Vec::with_capacity(strands.iter().len());
-    for (of, strand, mut sleep, still, (bonds, changes, added_mass), others) in &mut strands {
+    for (of, strand, mut sleep, still, (bonds, changes, added_mass, own), others) in &mut strands {
         let Some(hair) = hair_of(of.0) else { continue };
         let (treatments, water, held) = others;
         let restless = strand.is_changed()
             || bonds.is_changed()
+            || own.is_some_and(|own| own.is_changed())
             || sleep.bypass_change_detection().take_disturbed()
             || !changes.is_empty()
             || !added_mass.in_water.is_empty()
@@ -446,7 +455,7 @@ fn comes_near(still: &SleepPose, solids: &[(Solid, f32)]) -> bool {
 }
 
 /// Whether moving air reaches the strand's root, middle or tip.
-fn is_blown(strand: &Strand, winds: &LocalWinds) -> bool {
+pub(crate) fn is_blown(strand: &Strand, winds: &LocalWinds) -> bool {
     let (p, last) = (strand.positions(), strand.edges().saturating_sub(1));
     [0, last / 2, last].into_iter().any(|i| {
         let air = winds.around_edge(p[i], p[i + 1] - p[i]);

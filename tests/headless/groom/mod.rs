@@ -1,9 +1,12 @@
 //! Grooms: files read and written, malformed ones refused, strands reshaped and worn.
 
+#[cfg(feature = "render")]
+mod drawn;
 mod files;
 mod gltf;
 mod malformed;
 mod odd;
+mod reload;
 mod reshape;
 mod tressfx;
 mod worn;

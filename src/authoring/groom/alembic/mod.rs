@@ -19,11 +19,14 @@
 //! | UVs of roots | `groom_root_uv`, else `uv`; V counts from the bottom there, from the top in a [`Groom`] |
 //! | colours | `groom_color`, else `Cd` |
 //! | guides | `groom_guide`: see [`Groom::with_guides`] |
+//! | groups | `groom_group_id` and `groom_group_name`; else each set of several is one: see [`Groom::groups`] |
+//! | stiffness | `groom_stiffness`, our own: see [`Groom::with_stiffness`] |
 //!
 //! Each may be one for the set, one a curve or one a point; sets that have none where others do take the mean
-//! of those (zero for UVs).
+//! of those (zero for UVs, 1 for stiffness).
 
 mod curves;
+mod groups;
 mod ogawa;
 mod params;
 
@@ -42,8 +45,12 @@ use bevy::{
     prelude::*,
 };
 use curves::{CUBIC, Curve, Curves, Kind};
+use groups::Groups;
 use ogawa::{Children, Compound, EXPORT_AGAIN, Object, Ogawa, Property, Values};
-use params::{COLOR, Column, Counts, GUIDE, Param, ROOT_UV, WIDTH, first_of, from_the_top};
+use params::{
+    COLOR, Column, Counts, GROUP, GROUP_NAME, GUIDE, Param, ROOT_UV, STIFFNESS, WIDTH, first_of,
+    from_the_top,
+};
 
 /// Objects nested deeper are refused.
 const DEEPEST: usize = 256;
@@ -80,19 +87,25 @@ pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
         colors: Column::EMPTY,
         uvs: Column::EMPTY,
         guides: Column::EMPTY,
+        stiffness: Column::EMPTY,
+        groups: Groups::default(),
         losses: GroomLosses::default(),
     };
     reading.walk()?;
-    let Reading { mut groom, widths, colors, uvs, guides, losses, .. } = reading;
+    let Reading { mut groom, widths, colors, uvs, guides, stiffness, groups, losses, .. } = reading;
     if groom.is_empty() {
         let hint = "export hair curves or particle hair with it, visible";
         let found = format!("without curves ({losses})");
         return value(8, "the archive", found, "one with AbcGeom_Curve", hint);
     }
-    groom.widths = widths.filled(true).into_iter().map(|[width]| width).collect();
-    groom.colors = colors.filled(true).into_iter().map(LinearRgba::from_f32_array).collect();
-    groom.uvs = uvs.filled(false).into_iter().map(Vec2::from_array).collect();
-    groom.guides = guides.filled(false).into_iter().map(|[guide]| guide != 0.0).collect();
+    groom.widths = widths.filled(None).into_iter().map(|[width]| width).collect();
+    groom.colors = colors.filled(None).into_iter().map(LinearRgba::from_f32_array).collect();
+    groom.uvs = uvs.filled(Some([0.0; 2])).into_iter().map(Vec2::from_array).collect();
+    groom.stiffness = stiffness.filled(Some([1.0])).into_iter().map(|[share]| share).collect();
+    if groups.is_known || groups.sets > 1 {
+        (groom.groups, groom.all_groups) = (groups.of_strands.into(), groups.all.into());
+    }
+    groom.guides = guides.filled(Some([0.0])).into_iter().map(|[guide]| guide != 0.0).collect();
     Ok(Intake::cleaned(groom, losses)?)
 }
 
@@ -113,6 +126,8 @@ struct Reading<'a> {
     colors: Column<4>,
     uvs: Column<2>,
     guides: Column<1>,
+    stiffness: Column<1>,
+    groups: Groups,
     losses: GroomLosses,
 }
 
@@ -375,6 +390,14 @@ impl<'a> Reading<'a> {
         let guide = self.param::<1>(archive.find(own, GUIDE)?, counts, path);
         let guide = guide.as_ref().map(|guide| curves.iter().map(|curve| guide.at(curve, 0)));
         self.guides.add(curves.len(), guide);
+        let own_share = self.param::<1>(archive.find(own, STIFFNESS)?, counts, path);
+        let own_share = own_share.as_ref().map(|of| curves.iter().map(|curve| of.at(curve, 0)));
+        self.stiffness.add(curves.len(), own_share);
+        let id = self.param::<1>(archive.find(own, GROUP)?, counts, path);
+        let names = archive.find(own, GROUP_NAME)?;
+        let names = names.map_or(Ok(Vec::new()), |names| archive.texts(names, counts.curves))?;
+        let id = |curve| id.as_ref().map(|id| id.at(curve, 0)[0] as i32);
+        self.groups.add(curves.iter().map(|curve| (id(curve), curve.index)), &names, path);
 
         let losses = &mut self.losses;
         let mut unread = |name: &str| {
@@ -413,7 +436,7 @@ impl<'a> Reading<'a> {
 }
 
 /// Attributes that are read …
-const READ: [&str; 5] = [WIDTH, COLOR, ROOT_UV, GUIDE, "Cd"];
+const READ: [&str; 8] = [WIDTH, COLOR, ROOT_UV, GUIDE, GROUP, GROUP_NAME, STIFFNESS, "Cd"];
 /// … and those about the file.
 const NOTES: [&str; 4] =
     ["groom_version_major", "groom_version_minor", "groom_tool", "groom_properties"];

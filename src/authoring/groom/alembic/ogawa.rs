@@ -15,6 +15,8 @@ const DATA: u64 = 1 << 63;
 const OWN_METADATA: u8 = u8::MAX;
 /// Bytes at the end of objects' headers that are hashes.
 const HASHES: u64 = 32;
+/// What a property of texts holds.
+const TEXT: u64 = 12;
 /// Bytes before the values of a sample.
 const KEY: usize = 16;
 /// How many times as many bytes may be looked at as the file has, and how many in any case: parts of an
@@ -385,6 +387,26 @@ impl<'a> Ogawa<'a> {
         let from = data.at as usize + KEY;
         let bytes = data.bytes.0.get(from..).filter(|bytes| len > 0 && bytes.len() >= size);
         Ok(bytes.map(|bytes| Values { bytes, size, number, at: from as u64 }))
+    }
+
+    /// The texts of a property's first sample, each ended by a zero, up to `most`; none where it has numbers.
+    pub fn texts(
+        &self,
+        property: Property<'a>,
+        most: usize,
+    ) -> Result<Vec<&'a str>, GroomFileError> {
+        let is_text = !property.is_compound() && property.info >> 4 & 15 == TEXT;
+        if !is_text || property.samples == 0 {
+            return Ok(Vec::new());
+        }
+        let group = self.group(property.at)?;
+        if group.len == 0 {
+            return Ok(Vec::new());
+        }
+        let (data, _) = self.data(self.child(group, 0)?)?;
+        let bytes = data.bytes.0.get(data.at as usize + KEY..).unwrap_or_default();
+        let texts = bytes.strip_suffix(&[0]).unwrap_or(bytes).split(|byte| *byte == 0);
+        Ok(texts.take(most).map(|text| str::from_utf8(text).unwrap_or("?")).collect())
     }
 
     /// The same by name.

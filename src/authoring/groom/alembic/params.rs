@@ -12,6 +12,10 @@ pub const WIDTH: &str = "groom_width";
 pub const COLOR: &str = "groom_color";
 pub const ROOT_UV: &str = "groom_root_uv";
 pub const GUIDE: &str = "groom_guide";
+pub const GROUP: &str = "groom_group_id";
+pub const GROUP_NAME: &str = "groom_group_name";
+/// Our own.
+pub const STIFFNESS: &str = "groom_stiffness";
 
 /// The numbers of one property, N to an element.
 pub struct Param<'a, const N: usize> {
@@ -138,13 +142,15 @@ impl<const N: usize> Column<N> {
         self.len = end;
     }
 
-    /// The array, empty if no set had it; sets that did not have zeros, or the mean of the others.
-    pub fn filled(mut self, by_mean: bool) -> Vec<[f32; N]> {
+    /// The array, empty if no set had it; sets that did not have `otherwise`, or the mean of the others.
+    pub fn filled(mut self, otherwise: Option<[f32; N]>) -> Vec<[f32; N]> {
         if self.values.is_empty() {
             return self.values;
         }
         self.values.resize(self.len, [0.0; N]);
-        if by_mean && !self.gaps.is_empty() {
+        if let Some(otherwise) = otherwise {
+            self.gaps.into_iter().for_each(|gap| self.values[gap].fill(otherwise));
+        } else if !self.gaps.is_empty() {
             let known = self.len - self.gaps.iter().map(ExactSizeIterator::len).sum::<usize>();
             let mut mean = [0.0; N];
             for (value, k) in self.values.iter().flat_map(|value| value.iter().zip(0..)) {

@@ -1,8 +1,8 @@
 //! Archives written here: transforms, types, attributes, and everything that can be wrong.
 
 use super::{
-    super::{GroomFormat, GroomSettings},
-    params::{COLOR, GUIDE, ROOT_UV, WIDTH},
+    super::{GroomFormat, GroomGroup, GroomSettings, GroomStrand},
+    params::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH},
     write::{Archive, Pod, Written, floats},
     *,
 };
@@ -188,7 +188,9 @@ fn several_sets_are_joined_and_others_counted() {
         archive.attribute((GUIDE, "uni"), (Pod::I16, 1), &guides),
         archive.attribute((COLOR, "con"), (Pod::F32, 3), &floats([0.5, 0.25, 0.0])),
         archive.attribute((ROOT_UV, "uni"), (Pod::F32, 2), &floats([0.1, 0.2, 0.3, 0.4])),
-        archive.attribute(("groom_group_id", "con"), (Pod::I32, 1), &ints(&[3])),
+        archive.attribute((GROUP, "con"), (Pod::I32, 1), &ints(&[3])),
+        archive.attribute((STIFFNESS, "uni"), (Pod::F32, 1), &floats([0.5, 2.0])),
+        archive.attribute(("groom_closest_guides", "uni"), (Pod::I32, 1), &ints(&[0, 0])),
     ];
     full.push(archive.compound(".arbGeomParams", "", attributes));
     let full = set(&mut archive, "full", full);
@@ -218,7 +220,12 @@ fn several_sets_are_joined_and_others_counted() {
     let part = |part: &str| [GroomPlace::Part(part.to_owned())];
     assert_eq!(losses.hidden_curves.places, part("/place/hidden"));
     assert_eq!(losses.empty_curves.places, part("/empty"));
-    assert_eq!(losses.unread_arrays.places, part("/full.groom_group_id"));
+    assert_eq!(losses.unread_arrays.places, part("/full.groom_closest_guides"));
+    let groups: Vec<_> = groom.strands().map(|s| s.group.map(|of| (of.id, &*of.path))).collect();
+    assert_eq!(groups[..2], [Some((0, "/bare")); 2]);
+    assert_eq!(groups[2..], [Some((3, "/full")); 2]);
+    let shares: Vec<f32> = groom.strands().map(|s| s.stiffness.unwrap()).collect();
+    assert_eq!(shares, [1.0, 1.0, 0.5, 2.0], "strands without are as stiff as the hair");
     assert_eq!(losses.skipped_primitives.count, 2, "{losses}");
     assert!(!losses.is_broken());
     // The marked strand is the guide.
@@ -315,6 +322,10 @@ fn archives_that_contain_themselves_and_copies_without_end_are_refused() {
     assert!(says.contains("as the file's size justifies"), "{says}");
 }
 
+fn group(id: i32, name: &str) -> GroomGroup {
+    GroomGroup { id, name: name.to_owned(), path: "/groom/strands".to_owned() }
+}
+
 fn whole() -> Groom {
     let strands = (0..7).map(|i| {
         (0..2 + i).map(move |k| Vec3::new(i as f32 * 0.01, k as f32 * 0.02, (i * k) as f32 * 1e-3))
@@ -329,6 +340,10 @@ fn whole() -> Groom {
             g.with_uvs((0..7).map(|i| Vec2::new(i as f32 / 7.0, i as f32 / 8.0)).collect())
         })
         .and_then(|g| g.with_guides((0..7).map(|i| i % 3 == 0).collect()))
+        .and_then(|g| g.with_stiffness((0..7).map(|i| 0.5 + i as f32).collect()))
+        .and_then(|g| {
+            g.with_groups(vec![group(2, "fringe"), group(-1, "")], vec![0, 0, 1, 0, 1, 1, 0])
+        })
         .unwrap()
 }
 
@@ -379,4 +394,55 @@ fn changed_bytes_do_no_harm() {
         }
     }
     assert!(read_all > 500, "{read_all}");
+}
+
+#[test]
+fn groups_have_the_names_and_numbers_of_the_file() {
+    let named = |attributes: fn(&mut Archive) -> Vec<Written>| {
+        let file = one(4, [1, 0, 0], |archive| (Vec::new(), attributes(archive)));
+        let (groom, losses) = read(&file).unwrap();
+        assert!(losses.is_empty(), "{losses}");
+        let of = |strand: GroomStrand| strand.group.map(|of| (of.id, of.name.clone()));
+        (groom.groups().len(), groom.strands().map(of).collect::<Vec<_>>())
+    };
+    assert_eq!(named(|_| Vec::new()), (0, vec![None, None]), "one set without any is no group");
+    let one_name =
+        named(|archive| vec![archive.attribute((GROUP_NAME, "con"), (Pod::Text, 1), b"beard\0")]);
+    assert_eq!(one_name, (1, vec![Some((0, "beard".to_owned())); 2]));
+    let each = named(|archive| {
+        let names = archive.attribute((GROUP_NAME, "uni"), (Pod::Text, 1), b"left\0right\0");
+        let ids = archive.attribute((GROUP, "uni"), (Pod::I32, 1), &ints(&[7, -2]));
+        vec![names, ids]
+    });
+    let expected = vec![Some((7, "left".to_owned())), Some((-2, "right".to_owned()))];
+    assert_eq!(each, (2, expected));
+    let ids = named(|archive| vec![archive.attribute((GROUP, "con"), (Pod::I32, 1), &ints(&[5]))]);
+    assert_eq!(ids, (1, vec![Some((5, "hair".to_owned())); 2]), "named as its curves are");
+
+    // They stay with their strands.
+    let whole = whole();
+    let picked = whole.picked([6, 2, 0]);
+    let name = |strand: GroomStrand| strand.group.unwrap().name.clone();
+    assert_eq!(picked.strands().map(name).collect::<Vec<_>>(), ["fringe", "", "fringe"]);
+    let shares: Vec<f32> = picked.strands().map(|s| s.stiffness.unwrap()).collect();
+    assert_eq!(shares, [6.5, 2.5, 0.5]);
+    let head =
+        |path: &str| GroomGroup { path: path.to_owned(), ..group(0, "") }.head().map(str::to_owned);
+    assert_eq!(head("/groom/Head/Hair/Hair"), Some("Head".to_owned()));
+    assert_eq!((head("/groom/Hair/Hair"), head("/hair"), head("")), (None, None, None));
+}
+
+#[test]
+fn broken_stiffness_is_left_out_as_other_numbers_are() {
+    let with = |shares: [f32; 2]| {
+        one(4, [1, 0, 0], |archive| {
+            let shares = archive.attribute((STIFFNESS, "uni"), (Pod::F32, 1), &floats(shares));
+            (Vec::new(), vec![shares])
+        })
+    };
+    let (groom, losses) = read(&with([2.0, -1.0])).unwrap();
+    assert_eq!((groom.len(), losses.broken_strands.count), (1, 1), "{losses}");
+    let (groom, losses) = read(&with([0.0, f32::NAN])).unwrap();
+    assert!(groom.len() == 2 && losses.broken_arrays.count == 1, "{losses}");
+    assert!(groom.strands().all(|strand| strand.stiffness.is_none()));
 }

@@ -1,7 +1,7 @@
 //! Writes Alembic archives.
 
-use super::params::{COLOR, GUIDE, ROOT_UV, from_the_top};
-use crate::authoring::groom::{Groom, GroomError};
+use super::params::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, from_the_top};
+use crate::authoring::groom::{Groom, GroomError, GroomGroup};
 use bevy::prelude::*;
 
 const DATA: u64 = 1 << 63;
@@ -18,6 +18,7 @@ pub(super) enum Pod {
     I32 = 6,
     F32 = 10,
     F64 = 11,
+    Text = 12,
 }
 
 /// A property or object that is written, before what holds it is.
@@ -188,6 +189,7 @@ impl Archive {
             Pod::I32 => "int32_t",
             Pod::F32 => "float32_t",
             Pod::F64 => "float64_t",
+            Pod::Text => "string",
         };
         let meaning = if extent == 2 { "interpretation=vector;" } else { "" };
         let metadata = format!(
@@ -203,9 +205,10 @@ pub(super) fn floats(numbers: impl IntoIterator<Item = f32>) -> Vec<u8> {
 
 /// The bytes of an `.abc` file (Ogawa) of this groom, in metres and with Y up: one set of linear curves
 /// below a transform. Widths become `width`; UVs of roots, colours without alpha and guides the attributes
-/// that Unreal Engine reads (`groom_root_uv`, `groom_color`, `groom_guide`).
+/// that Unreal Engine reads (`groom_root_uv`, `groom_color`, `groom_guide`, `groom_group_id`, `groom_group_name`), and
+/// stiffness `groom_stiffness`.
 ///
-/// Reading what was written gives the same groom, but for alpha, and writing that the same bytes.
+/// Reading what was written gives the same groom, but for alpha and the paths of groups, and writing that the same bytes.
 ///
 /// ```no_run
 /// # use bevy_keratin::authoring::groom::{Groom, alembic};
@@ -250,6 +253,19 @@ pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
         let guides = groom.guides.iter().flat_map(|guide| i16::from(*guide).to_le_bytes());
         let guides: Vec<u8> = guides.collect();
         attributes.push(archive.attribute((GUIDE, "uni"), (Pod::I16, 1), &guides));
+    }
+    if !groom.stiffness.is_empty() {
+        let shares = floats(groom.stiffness.iter().copied());
+        attributes.push(archive.attribute((STIFFNESS, "uni"), (Pod::F32, 1), &shares));
+    }
+    if !groom.groups.is_empty() {
+        let unnamed = GroomGroup::default();
+        let of = || groom.strands().map(|strand| strand.group.unwrap_or(&unnamed));
+        let ids: Vec<u8> = of().flat_map(|group| group.id.to_le_bytes()).collect();
+        attributes.push(archive.attribute((GROUP, "uni"), (Pod::I32, 1), &ids));
+        let names: Vec<u8> =
+            of().flat_map(|group| group.name.bytes().filter(|b| *b != 0).chain([0])).collect();
+        attributes.push(archive.attribute((GROUP_NAME, "uni"), (Pod::Text, 1), &names));
     }
     if !attributes.is_empty() {
         set.push(archive.compound(".arbGeomParams", "", attributes));
