@@ -370,9 +370,9 @@ fn no_file_is_too_long_to_be_understood() {
 /// made once for a crowd and changed under a slider or at a tick of the game's choice,
 /// 48,850 before hats, several hairs of one wear, and hair that comes to its lengths where solids jam it,
 /// 49,480 before a hat held what grows under it, a character's own helmets hid hair, held hair gave way on the graphics card
-/// too, and what is done to hair in a pause stayed.
+/// too, and what is done to hair in a pause stayed, 49,820 before hair had a pass of its own, and drops had layers.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 49_820;
+const MOST_LINES: usize = 50_370;
 
 #[test]
 fn the_crate_stays_small() {
