@@ -1,4 +1,4 @@
-//! Water as beads: small clear drops, all of them one draw call.
+//! Water as beads: small clear drops, all that the same cameras see one draw call.
 //!
 //! Every frame [`HairBeads`] is filled with the [`Droplet`]s; others may be added to it. Beads are drawn
 //! stretched along their velocity. Each bead is a camera-facing square on which a sphere is shaded; the
@@ -10,9 +10,14 @@ use crate::{
     forces::environment::HairGravity,
     water::{Droplet, DropletRules, model::ball_radius},
 };
+use bevy::platform::collections::HashSet;
 use bevy::{
     asset::{RenderAssetUsages, embedded_asset},
-    camera::{primitives::Aabb, visibility::NoAutoAabb},
+    camera::{
+        primitives::Aabb,
+        visibility::{NoAutoAabb, RenderLayers},
+    },
+    ecs::system::SystemParam,
     light::NotShadowCaster,
     mesh::{
         Indices, MeshVertexAttribute, MeshVertexBufferLayoutRef, PrimitiveTopology,
@@ -41,6 +46,8 @@ pub struct Bead {
     pub radius: f32,
     /// Velocity (m/s): fast beads are drawn long and slim.
     pub velocity: Vec3,
+    /// The entity whose `RenderLayers` it has. Default none: layer 0, as where that entity has none.
+    pub layers_of: Option<Entity>,
 }
 
 impl Bead {
@@ -52,7 +59,7 @@ impl Bead {
     /// assert!((drop.radius - 0.62e-3).abs() < 1e-5);
     /// ```
     pub fn of_volume(position: Vec3, volume: f64, velocity: Vec3) -> Self {
-        Self { position, radius: ball_radius(volume), velocity }
+        Self { position, radius: ball_radius(volume), velocity, layers_of: None }
     }
 
     /// As the shader reads it: 32 bytes. Non-finite beads have radius 0.
@@ -69,6 +76,10 @@ impl Bead {
 
 /// The beads to draw in this frame, in any order. [`HairBeadSystems`] fill it in `PostUpdate`, before
 /// [`HairRenderSystems`]; add your own between the two.
+///
+/// A [`Droplet`] that a hair carries, and one that fell from it, is seen where that hair is: it has the hair's
+/// `RenderLayers`, and is hidden with it. `RenderLayers` and `Visibility` on the droplet itself or above it come first:
+/// `Hidden` hides it, `Visible` shows it round hidden hair.
 #[derive(Resource, Reflect, Clone, Debug, Default, Deref, DerefMut)]
 #[reflect(Resource, Default)]
 pub struct HairBeads(pub Vec<Bead>);
@@ -86,11 +97,31 @@ pub(super) fn are_any(beads: Res<HairBeads>, droplets: Query<(), With<Droplet>>)
     !droplets.is_empty() || !beads.is_empty()
 }
 
+/// What says whether a drop is seen.
+#[derive(SystemParam)]
+pub(super) struct Sight<'w, 's> {
+    visibility: Query<'w, 's, &'static Visibility>,
+    parents: Query<'w, 's, &'static ChildOf>,
+}
+
+impl Sight<'_, '_> {
+    /// As Bevy will find for this frame; unknown where nothing says so.
+    fn of(&self, entity: Entity) -> Option<bool> {
+        let line = core::iter::once(entity).chain(self.parents.iter_ancestors(entity));
+        line.filter_map(|at| self.visibility.get(at).ok()).find_map(|visibility| match visibility {
+            Visibility::Hidden => Some(false),
+            Visibility::Visible => Some(true),
+            Visibility::Inherited => None,
+        })
+    }
+}
+
 /// Droplets interpolated between two ticks. Those that lie on something flatten to caps, and shrink
 /// as they run off.
 pub(super) fn show_droplets(
     mut beads: ResMut<HairBeads>,
-    droplets: Query<&Droplet>,
+    droplets: Query<(Entity, &Droplet, Has<RenderLayers>)>,
+    (sight, mut last): (Sight, Local<(Option<Entity>, bool)>),
     (rules, gravity): (Option<Res<DropletRules>>, Option<Res<HairGravity>>),
     (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
 ) {
@@ -104,26 +135,45 @@ pub(super) fn show_droplets(
         rules.map(|rules| rules.clamped()).unwrap_or_default().resting_time.max(FLATTENING_SECONDS);
     let down = gravity.map_or(Vec3::NEG_Y, |gravity| gravity.normalize_or_zero());
     beads.clear();
-    beads.extend(droplets.iter().map(|drop| {
+    *last = (None, true);
+    beads.extend(droplets.iter().filter_map(|(entity, drop, has_layers)| {
+        if last.0 != drop.hair() {
+            *last = (drop.hair(), drop.hair().and_then(|hair| sight.of(hair)).unwrap_or(true));
+        }
+        if !sight.of(entity).unwrap_or(last.1) {
+            return None;
+        }
+        let layers_of = if has_layers { Some(entity) } else { drop.hair() };
         let position = drop.position - drop.velocity * late;
         let radius = drop.radius();
         if drop.lying <= 0.0 {
-            return Bead { position, radius, velocity: drop.velocity };
+            return Some(Bead { position, radius, velocity: drop.velocity, layers_of });
         }
         let flattened = FLATTENED_SHARE * (drop.lying / FLATTENING_SECONDS).min(1.0);
         let left = (1.0 - drop.lying / longest).clamp(0.0, 1.0).sqrt();
         // The cap stays on the surface as it shrinks.
         let position = position + down * (radius * (1.0 - left * (1.0 - flattened)));
-        Bead { position, radius: radius * left * (1.0 + 0.3 * flattened), velocity: Vec3::ZERO }
+        let radius = radius * left * (1.0 + 0.3 * flattened);
+        Some(Bead { position, radius, velocity: Vec3::ZERO, layers_of })
     }));
 }
 
 type PackedBead = [f32; 8];
 
-/// The buffer of drawn beads, with spare capacity so that few frames reallocate.
+/// What is drawn of beads: those of the same layers together.
 #[derive(Resource, Default)]
-struct DrawnBeads {
+struct DrawnBeads(Vec<BeadGroup>);
+
+/// The buffer of some drawn beads, with spare capacity so that few frames reallocate.
+#[derive(Default)]
+struct BeadGroup {
+    layers: RenderLayers,
     packed: Vec<PackedBead>,
+    /// How many of these there are, for how many there was room, and the corners of the box around them.
+    count: usize,
+    room: usize,
+    low: Vec3,
+    high: Vec3,
     buffer: Handle<ShaderBuffer>,
     entity: Option<Entity>,
 }
@@ -198,45 +248,80 @@ fn pack(
     mut materials: ResMut<Assets<BeadMaterial>>,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
     mut bounds: Query<&mut Aabb>,
+    layers: Query<&RenderLayers>,
 ) {
-    let count = beads.len().min(MOST);
-    // Mesh and material are spawned with the first bead.
-    if !beads.is_changed() || (count == 0 && drawn.entity.is_none()) {
+    if !beads.is_changed() || (beads.is_empty() && drawn.0.is_empty()) {
         return;
     }
-    let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
-    let room = capacity(count, drawn.packed.len());
-    let is_new = room != drawn.packed.len();
-    let packed = beads.iter().take(count).map(|bead| {
+    let DrawnBeads(groups) = &mut *drawn;
+    groups.iter_mut().for_each(BeadGroup::clear);
+    let (mut last, mut at) = (None, 0);
+    for bead in beads.iter().take(MOST) {
+        if last != Some(bead.layers_of) {
+            last = Some(bead.layers_of);
+            let of = bead.layers_of.and_then(|of| layers.get(of).ok()).unwrap_or_default();
+            at = groups.iter().position(|group| group.layers == *of).unwrap_or(groups.len());
+            if at == groups.len() {
+                groups.push(BeadGroup { layers: of.clone(), ..default() });
+                groups[at].clear();
+            }
+        }
+        groups[at].push(bead);
+    }
+    for group in groups.iter_mut() {
+        let room = capacity(group.count, group.room);
+        group.packed.resize(room, [0.0; 8]);
+        let (low, high) = (group.low, group.high);
+        let around = if low.x <= high.x { Aabb::from_min_max(low, high) } else { Aabb::default() };
+        let entity = group.entity.and_then(|entity| bounds.get_mut(entity).ok());
+        if room == group.room
+            && let Some(mut bounds) = entity
+        {
+            bounds.set_if_neq(around);
+            continue;
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(&group.packed);
+        group.buffer = buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::default()));
+        let parts = (
+            Name::new("drawn beads"),
+            Mesh3d(meshes.add(quads(room as u32))),
+            MeshMaterial3d(materials.add(BeadMaterial { beads: group.buffer.clone() })),
+            (group.layers.clone(), around, NoAutoAabb, NotShadowCaster),
+        );
+        if let Some(old) = group.entity.take() {
+            commands.entity(old).try_despawn();
+        }
+        group.entity = Some(commands.spawn(parts).id());
+    }
+    // Layers that no bead has any more; of the last ones the room is kept.
+    let mut kept = 0;
+    groups.retain(|group| {
+        let keep = group.count > 0 || kept == 0 && beads.is_empty();
+        kept += usize::from(keep);
+        if let (false, Some(entity)) = (keep, group.entity) {
+            commands.entity(entity).try_despawn();
+        }
+        keep
+    });
+}
+
+impl BeadGroup {
+    fn clear(&mut self) {
+        self.room = self.packed.len();
+        self.packed.clear();
+        (self.count, self.low, self.high) = (0, Vec3::MAX, Vec3::MIN);
+    }
+
+    fn push(&mut self, bead: &Bead) {
         let packed = bead.packed();
         let reach = 4.0 * packed[3];
         if reach > 0.0 {
-            (low, high) = (low.min(bead.position - reach), high.max(bead.position + reach));
+            self.low = self.low.min(bead.position - reach);
+            self.high = self.high.max(bead.position + reach);
         }
-        packed
-    });
-    drawn.packed.clear();
-    drawn.packed.extend(packed);
-    drawn.packed.resize(room, [0.0; 8]);
-    let around = if low.x <= high.x { Aabb::from_min_max(low, high) } else { Aabb::default() };
-    if !is_new && let Some(Ok(mut bounds)) = drawn.entity.map(|entity| bounds.get_mut(entity)) {
-        bounds.set_if_neq(around);
-        return;
+        self.packed.push(packed);
+        self.count += 1;
     }
-    let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
-    drawn.buffer = buffers.add(ShaderBuffer::new(bytes, RenderAssetUsages::default()));
-    let parts = (
-        Name::new("drawn beads"),
-        Mesh3d(meshes.add(quads(room as u32))),
-        MeshMaterial3d(materials.add(BeadMaterial { beads: drawn.buffer.clone() })),
-        around,
-        NoAutoAabb,
-        NotShadowCaster,
-    );
-    if let Some(old) = drawn.entity.take() {
-        commands.entity(old).try_despawn();
-    }
-    drawn.entity = Some(commands.spawn(parts).id());
 }
 
 /// Room for `count` beads where there is room for `present`: made smaller where it is much too large, because all
@@ -248,7 +333,7 @@ fn capacity(count: usize, present: usize) -> usize {
 
 /// Writes beads that have changed to the GPU. A buffer created in this frame is uploaded with its contents instead.
 fn upload(
-    mut is_stale: Local<bool>,
+    mut written: Local<HashSet<AssetId<ShaderBuffer>>>,
     drawn: Extract<Option<Res<DrawnBeads>>>,
     buffers: Option<Res<RenderAssets<GpuShaderBuffer>>>,
     queue: Option<Res<RenderQueue>>,
@@ -256,16 +341,20 @@ fn upload(
     let (Some(drawn), Some(buffers), Some(queue)) = (drawn.as_ref(), buffers, queue) else {
         return;
     };
-    let bytes: &[u8] = bytemuck::cast_slice(&drawn.packed);
-    *is_stale |= drawn.is_changed() || queue.is_changed();
-    // Skipped in the frame in which a new device's queue is combined with buffers of a lost one.
-    if *is_stale
-        && let Some(gpu) = buffers.get(&drawn.buffer)
-        && !queue.is_changed()
-        && gpu.buffer.size() == bytes.len() as u64
-    {
-        queue.write_buffer(&gpu.buffer, 0, bytes);
-        *is_stale = false;
+    if drawn.is_changed() || queue.is_changed() {
+        written.clear();
+    }
+    for group in &drawn.0 {
+        let bytes: &[u8] = bytemuck::cast_slice(&group.packed);
+        // Skipped in the frame in which a new device's queue is combined with buffers of a lost one.
+        if !written.contains(&group.buffer.id())
+            && let Some(gpu) = buffers.get(&group.buffer)
+            && !queue.is_changed()
+            && gpu.buffer.size() == bytes.len() as u64
+        {
+            queue.write_buffer(&gpu.buffer, 0, bytes);
+            written.insert(group.buffer.id());
+        }
     }
 }
 

@@ -13,7 +13,6 @@ use super::{
     rings::Rings,
     scatter::{scatter, shorten},
     sets::Interpolate,
-    smoothing::Marks,
     streaks::DrawnStreaks,
     thickness::Thickness,
 };
@@ -147,7 +146,7 @@ pub(super) fn pack(
     mut drawn: Query<(&mut Aabb, &MeshMaterial3d<RibbonMaterial>)>,
     (looks, dyes, views): (Settings<HairLook>, Settings<HairDye>, Settings<HairView>),
     followers: Settings<HairFollowers>,
-    (time, interpolate, marks): (Option<Res<Time<Fixed>>>, Res<Interpolate>, Res<Marks>),
+    (time, interpolate): (Option<Res<Time<Fixed>>>, Res<Interpolate>),
     device: Option<Res<RenderDevice>>,
     (mut known_meshes, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
     mut materials: ResMut<Assets<RibbonMaterial>>,
@@ -200,7 +199,7 @@ pub(super) fn pack(
         let around = |margin: f32| Aabb::from_min_max(low - margin, high + margin);
         let (look, dye) = (looks.of(hair), dyes.of(hair));
         let view = views.of(hair);
-        let key = |rings: bool| RibbonKey::new(&look, view, rings, *marks);
+        let key = |rings: bool| RibbonKey::new(&look, view, rings);
 
         let known = buffers.and_then(|b| drawn.get_mut(b.drawn).ok().zip(Some(b)));
         if packed.layout.is_empty() {

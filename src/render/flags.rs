@@ -1,8 +1,8 @@
 //! What cameras and lights see of drawn hair: components of Bevy's on a hair or its wearer.
 
-use super::{HairBuffers, depth};
+use super::{HairBeadSystems, HairBuffers, HairRenderSystems, depth};
 use crate::hair::{
-    strand::Hair,
+    strand::{DrawnFrames, Hair},
     worn::{CopyOf, Passed, WornHair, pass_on},
 };
 use bevy::{
@@ -27,11 +27,15 @@ pub(super) fn plugin(app: &mut App) {
     app.register_type::<HiddenWithWearer>()
         .configure_sets(
             PostUpdate,
-            (Flags::ToHair, Flags::ToDrawn)
-                .chain()
-                .after(super::draw::pack)
-                .before(depth::follow)
-                .before(VisibilitySystems::VisibilityPropagate),
+            (
+                // Drops on hair are seen as it is.
+                Flags::ToHair.after(DrawnFrames).before(HairBeadSystems).before(HairRenderSystems),
+                Flags::ToDrawn
+                    .after(Flags::ToHair)
+                    .after(super::draw::pack)
+                    .before(depth::follow)
+                    .before(VisibilitySystems::VisibilityPropagate),
+            ),
         )
         .add_systems(PostUpdate, hide_with_wearer.in_set(Flags::ToHair));
     flag::<RenderLayers>(app);

@@ -20,7 +20,10 @@ use crate::{
     hair::look::HairLook,
 };
 use bevy::{
-    asset::RenderAssetUsages, camera::primitives::Aabb, prelude::*, render::storage::ShaderBuffer,
+    asset::RenderAssetUsages,
+    camera::{primitives::Aabb, visibility::RenderLayers},
+    prelude::*,
+    render::storage::ShaderBuffer,
 };
 
 /// After strands have been packed: chooses how many are drawn, and gathers the solids near them.
@@ -33,10 +36,10 @@ pub(super) fn prepare(
         &mut DrawnFrame,
         Option<&Obstacles>,
     )>,
-    mut drawn: Query<(&mut Mesh3d, &Aabb, &MeshMaterial3d<RibbonMaterial>)>,
+    mut drawn: Query<(&mut Mesh3d, &Aabb, &MeshMaterial3d<RibbonMaterial>, Option<&RenderLayers>)>,
     colliders: Query<(Entity, &HairCollider, &GlobalTransform)>,
     (looks, views, details): (Settings<HairLook>, Settings<HairView>, Settings<HairDetail>),
-    cameras: Query<(&Camera, &GlobalTransform)>,
+    cameras: Query<(&Camera, &GlobalTransform, Option<&RenderLayers>)>,
     (mut known, mut meshes): (ResMut<RibbonMeshes>, ResMut<Assets<Mesh>>),
     (mut shader_buffers, mut images, mut materials): (
         ResMut<Assets<ShaderBuffer>>,
@@ -55,14 +58,22 @@ pub(super) fn prepare(
     for (hair, mut buffers, mut packed, place, mut frame, obstacles) in &mut hairs {
         let frame = frame.bypass_change_detection();
         let packed = packed.bypass_change_detection();
-        let Ok((mut mesh, around, material)) = drawn.get_mut(buffers.drawn) else { continue };
+        let Ok((mut mesh, around, material, layers)) = drawn.get_mut(buffers.drawn) else {
+            continue;
+        };
         let hair_place = place.affine();
         let inside = (Vec3::from(around.center), Vec3::from(around.half_extents));
         let scale = hair_place.matrix3.determinant().abs().cbrt();
         let center = place.transform_point(inside.0);
-        let seen = cameras.iter().filter(|(camera, _)| camera.is_active);
-        let pixels = seen
-            .filter_map(|(camera, from)| pixel_in(camera, from, center, inside.1.length() * scale));
+        let layers = layers.unwrap_or_default();
+        let seen = cameras.iter().filter(|(camera, _, of)| {
+            camera.is_active && of.unwrap_or_default().intersects(layers)
+        });
+        let mut lit_by = RenderLayers::none();
+        let pixels = seen.filter_map(|(camera, from, of)| {
+            lit_by = lit_by.union(of.unwrap_or_default());
+            pixel_in(camera, from, center, inside.1.length() * scale)
+        });
         frame.pixel = pixels.reduce(f32::min).map(|finest| finest / scale).or(frame.pixel);
         let count = buffers.strand_count;
         let share = match views.of(hair) {
@@ -101,7 +112,7 @@ pub(super) fn prepare(
         frame.packed = PackedFrame::new(share);
         let from_world = hair_place.inverse();
         frame.volume = HairVolume::around(inside.0, inside.1, side, frame.volume);
-        let nearest = lights.at(center, inside.1.length() * scale);
+        let nearest = lights.at(center, inside.1.length() * scale, &lit_by);
         frame.packed.set_volume(frame.volume, nearest, &from_world);
         solids.clear();
         gather(&mut solids, &balls, inside, place, &colliders, obstacles);

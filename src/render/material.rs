@@ -2,9 +2,9 @@
 
 use super::{
     HairFollowers, HairView,
+    pass::MARKS,
     ribbon_mesh::{CORNER, DrawOrder},
     rings::Rings,
-    smoothing::Marks,
     thickness::{PIECES, Thickness},
 };
 use crate::hair::look::{HairDye, HairLook, HairShading, MAX_LAYERS};
@@ -15,8 +15,8 @@ use bevy::{
     prelude::*,
     render::{
         render_resource::{
-            AsBindGroup, CompareFunction, RenderPipelineDescriptor, ShaderType,
-            SpecializedMeshPipelineError,
+            AsBindGroup, ColorTargetState, ColorWrites, CompareFunction, RenderPipelineDescriptor,
+            ShaderType, SpecializedMeshPipelineError,
         },
         storage::ShaderBuffer,
     },
@@ -84,25 +84,20 @@ pub(super) struct RibbonKey {
     kajiya_kay: bool,
     /// Whether rings are computed once a frame.
     pub(super) expanded: bool,
-    /// Whether lit hair marks its pixels, see `HairSmoothing`.
+    /// Whether it is averaged along its strands, see `HairSmoothing`.
     marked: bool,
 }
 
 impl RibbonKey {
-    pub(super) fn new(
-        look: &HairLook,
-        view: HairView,
-        expanded: bool,
-        Marks(marked): Marks,
-    ) -> Self {
+    pub(super) fn new(look: &HairLook, view: HairView, expanded: bool) -> Self {
         let heat = !matches!(view, HairView::Natural | HairView::Guides);
         let kajiya_kay = !heat && look.shading == HairShading::KajiyaKay;
-        Self { heat, kajiya_kay, expanded, marked: marked && !heat }
+        Self { heat, kajiya_kay, expanded, marked: !heat }
     }
 
     /// Depth is the same whatever colour is seen.
     fn of_depth(self) -> Self {
-        Self { expanded: self.expanded, ..default() }
+        Self { expanded: self.expanded, marked: self.marked, ..default() }
     }
 
     pub(super) fn is_lit(self) -> bool {
@@ -315,6 +310,16 @@ impl<D: Draw> Material for RibbonMaterial<D> {
             defs.extend(kajiya_kay.then(|| "HAIR_KAJIYA_KAY".into()));
             defs.extend(marked.then(|| "HAIR_MARKED".into()));
             defs.extend(D::DEPTH.then(|| "HAIR_DEPTH".into()));
+            if in_picture {
+                // The pass has both: depth writes marks, light the picture.
+                let [picture, marks] = match D::DEPTH {
+                    true => [ColorWrites::empty(), ColorWrites::ALL],
+                    false => [ColorWrites::ALL, ColorWrites::empty()],
+                };
+                fragment.targets.iter_mut().flatten().for_each(|to| to.write_mask = picture);
+                let to = ColorTargetState { format: MARKS, blend: None, write_mask: marks };
+                fragment.targets.push(Some(to));
+            }
         }
         Ok(())
     }

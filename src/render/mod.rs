@@ -73,6 +73,7 @@ mod kernel;
 mod locks;
 mod material;
 mod packed_frame;
+mod pass;
 mod present;
 mod ribbon_mesh;
 mod rings;
@@ -98,6 +99,8 @@ pub use drawn_strand::{DrawnStrand, LockOffset};
 pub(crate) use elsewhere::DrawnElsewhere;
 pub use follower_roots::{FollowerRoot, FollowerRoots};
 pub use followers::HairFollowers;
+#[doc(hidden)]
+pub use pass::HairPhase;
 pub use sets::HairRenderSystems;
 pub use smoothing::HairSmoothing;
 pub use view::{HairView, STRAIN_FULL, heat};
@@ -210,7 +213,6 @@ impl Plugin for HairRenderPlugin {
         load_shader_library!(app, "rings.wgsl");
         load_shader_library!(app, "ribbon.wgsl");
         load_shader_library!(app, "coverage.wgsl");
-        load_shader_library!(app, "marks.wgsl");
         load_shader_library!(app, "fibre.wgsl");
         load_shader_library!(app, "passage.wgsl");
         load_shader_library!(app, "volume/counts.wgsl");
@@ -242,6 +244,7 @@ impl Plugin for HairRenderPlugin {
                 .before(AssetEventSystems),
         );
         flags::plugin(app);
+        pass::plugin(app);
         smoothing::plugin(app);
         upload::plugin(app);
         expand::plugin(app);

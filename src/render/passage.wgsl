@@ -5,7 +5,7 @@
 #define_import_path bevy_keratin::passage
 
 #import bevy_pbr::mesh_view_bindings as view_bindings
-#import bevy_pbr::mesh_view_bindings::lights
+#import bevy_pbr::mesh_view_bindings::{view, lights}
 #import bevy_pbr::mesh_view_types::POINT_LIGHT_FLAGS_SPOT_LIGHT_Y_NEGATIVE
 #import bevy_pbr::shadows
 #import bevy_render::maths::orthonormalize
@@ -13,7 +13,7 @@
 
 // Where light goes to, and what it meets before.
 struct Way {
-    position: vec3<f32>,
+    from_eye: vec3<f32>,
     density: f32,           // fibres that it meets on a metre
     // By how much the fibre there comes nearer to the light, for a metre across it.
     slope: f32,
@@ -82,12 +82,13 @@ fn sun_passage(id: u32, way: Way, view_z: f32) -> Passage {
         return OPEN;
     }
     let cascade = &(*light).cascades[cascade_index];
-    let clip = (*cascade).clip_from_world * vec4(way.position, 1.0);
+    let m = (*cascade).clip_from_world;
+    // What is rounded is the same for all of a picture.
+    let clip = m * vec4(view.world_position, 1.0) + m * vec4(way.from_eye, 0.0);
     if clip.w <= 0.0 || any(abs(clip.xy) > vec2(clip.w)) || clip.z < 0.0 {
         return OPEN;
     }
     let ndc = clip.xyz / clip.w;
-    let m = (*cascade).clip_from_world;
     let metres = inverseSqrt(max(m[0].z * m[0].z + m[1].z * m[1].z + m[2].z * m[2].z, 1e-12));
     let scale = DepthScale(0.0, metres);
     let layer = i32((*light).depth_texture_base_index + cascade_index);
@@ -97,7 +98,7 @@ fn sun_passage(id: u32, way: Way, view_z: f32) -> Passage {
 
 fn spot_passage(id: u32, way: Way) -> Passage {
     let light = &view_bindings::clustered_lights.data[id];
-    let from_light = way.position - (*light).position_radius.xyz;
+    let from_light = way.from_eye - ((*light).position_radius.xyz - view.world_position);
     var axis = vec3((*light).light_custom_data.x, 0.0, (*light).light_custom_data.y);
     axis.y = sqrt(max(0.0, 1.0 - axis.x * axis.x - axis.z * axis.z));
     if ((*light).flags & POINT_LIGHT_FLAGS_SPOT_LIGHT_Y_NEGATIVE) != 0u {
@@ -123,7 +124,7 @@ fn spot_passage(id: u32, way: Way) -> Passage {
 // fibres before the place bounds how far away they are.
 fn point_passage(id: u32, way: Way, frag_coord: vec2<f32>) -> Passage {
     let light = &view_bindings::clustered_lights.data[id];
-    let to_light = (*light).position_radius.xyz - way.position;
+    let to_light = (*light).position_radius.xyz - view.world_position - way.from_eye;
     let far = max(length(to_light), 1e-6);
     let size = f32(textureDimensions(view_bindings::point_shadow_textures).x);
     let bias = bias_of(way) * 2.0 * far / size;
@@ -134,7 +135,7 @@ fn point_passage(id: u32, way: Way, frag_coord: vec2<f32>) -> Passage {
     for (var i = 0; i < 4; i++) {
         // The light's own bias suits walls; hair is thinner.
         let ahead = min(bias + steps[i] * fibre, far) - (*light).shadow_depth_bias;
-        let place = vec4(way.position + to_light * (ahead / far), 1.0);
+        let place = vec4(view.world_position + way.from_eye + to_light * (ahead / far), 1.0);
         let open = shadows::fetch_point_shadow(id, place, vec3(0.0), frag_coord);
         if i == 0 {
             lit = open;

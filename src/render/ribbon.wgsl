@@ -39,8 +39,10 @@ fn ring_at(index: u32, ring: u32) -> Ring {
 // Up to where cut hair keeps its width.
 const BLUNT: f32 = 0.9;
 
+// Places are ways from the eye, along the world's axes: ten kilometres from the origin, places in the world are rounded
+// to more than a strand's width.
 struct RibbonVertex {
-    world_position: vec3<f32>,
+    from_eye: vec3<f32>,
     // The point of the strand beside which this is.
     center: vec3<f32>,
     // And that in the hair's frame.
@@ -66,11 +68,21 @@ fn pixel_size(w: f32) -> f32 {
     return 2.0 * abs(w) / (abs(view.clip_from_view[1][1]) * max(view.viewport.w, 1.0));
 }
 
-fn toward_eye(position: vec3<f32>) -> vec3<f32> {
+fn toward_eye(from_eye: vec3<f32>) -> vec3<f32> {
     if view.clip_from_view[3][3] == 1.0 {
         return normalize(view.world_from_view[2].xyz);
     }
-    return normalize(view.world_position - position);
+    return normalize(-from_eye);
+}
+
+fn way_from_eye(world_from_local: mat4x4<f32>, place: vec3<f32>) -> vec3<f32> {
+    let m = world_from_local;
+    return mat3x3(m[0].xyz, m[1].xyz, m[2].xyz) * place + (m[3].xyz - view.world_position);
+}
+
+fn in_clip(from_eye: vec3<f32>) -> vec4<f32> {
+    let m = view.view_from_world;
+    return view.clip_from_view * vec4(mat3x3(m[0].xyz, m[1].xyz, m[2].xyz) * from_eye, 1.0);
 }
 
 fn safe_normalize(v: vec3<f32>, otherwise: vec3<f32>) -> vec3<f32> {
@@ -111,7 +123,7 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     let linear = mat3x3(world[0].xyz, world[1].xyz, world[2].xyz);
     let scale = pow(abs(determinant(linear)), 1.0 / 3.0);
     out.scale = scale;
-    let center = (world * vec4(ring.position, 1.0)).xyz;
+    let center = way_from_eye(world, ring.position);
     out.center = center;
     out.local = ring.position;
     out.tangent = safe_normalize(linear * ring.tangent, vec3(0.0, 1.0, 0.0));
@@ -122,19 +134,19 @@ fn ribbon_vertex(corner: u32, instance: u32) -> RibbonVertex {
     out.grown = out.whole * strand.size / max(ribbon.root_fade, 1e-9);
     let width = scale * ribbon.width * frame.wider * strand_width(strand) * mix(1.0, ribbon.taper, smoothstep(BLUNT, 1.0, out.along));
     // Of a shadow map, a texel.
-    let drawn = max(width, pixel_size((view.clip_from_world * vec4(center, 1.0)).w));
+    let drawn = max(width, pixel_size(in_clip(center).w));
     out.share = alpha * width / max(drawn, 1e-9);
     let across = safe_normalize(cross(out.tangent, eye), normalize(view.world_from_view[0].xyz));
-    out.world_position = center + across * (side * drawn);
+    out.from_eye = center + across * (side * drawn);
     return out;
 }
 
 #ifdef MOTION_VECTOR_PREPASS
-// Where a vertex was in the frame before. The side it faced then is taken for that it faces now.
+// Where a vertex was in the frame before, from where the eye is now. The side it faced then is taken for that it faces now.
 fn place_before(vertex: RibbonVertex, corner: u32, instance: u32) -> vec3<f32> {
     let strand = strands[corner / (2u * (ribbon.segments + 1u))];
     let point = past_strand_position(strand, vertex.along);
     let world = mesh_functions::get_previous_world_from_local(instance);
-    return (world * vec4(point, 1.0)).xyz + vertex.world_position - vertex.center;
+    return way_from_eye(world, point) + (vertex.from_eye - vertex.center);
 }
 #endif

@@ -1,18 +1,14 @@
 // Hair as the camera sees it, in two draws: depth with stochastic coverage, then light on what is in front.
 
-#import bevy_pbr::view_transformations::position_world_to_clip
 #import bevy_pbr::mesh_functions
 #import bevy_pbr::mesh_bindings::mesh
 #import bevy_pbr::mesh_types::MESH_FLAGS_SHADOW_RECEIVER_BIT
 #import bevy_pbr::mesh_view_bindings::view
 #import bevy_pbr::pbr_types::{pbr_input_new, STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT}
 #import bevy_pbr::pbr_functions::main_pass_post_lighting_processing
-#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, facing_normal, safe_normalize}
+#import bevy_keratin::ribbon::{ribbon_vertex, in_clip, toward_eye, facing_normal, safe_normalize}
 #import bevy_keratin::strands::{ribbon, streaks, density_at}
-#import bevy_keratin::coverage::{covered_samples, SAMPLES}
-#ifdef HAIR_MARKED
-#import bevy_keratin::marks::marked
-#endif
+#import bevy_keratin::coverage::covered_samples
 #import bevy_keratin::shading::{Fibre, lit_hair}
 #import bevy_keratin::volume::volume_place
 
@@ -21,8 +17,8 @@ const STRAIN_FULL: f32 = 0.05;
 
 struct ForwardVertex {
     @invariant @builtin(position) position: vec4<f32>,
-    // Of the middle of the strand: beside it a ribbon would lie in its own shadow.
-    @location(0) world_position: vec3<f32>,
+    // To the middle of the strand: beside it a ribbon would lie in its own shadow.
+    @location(0) from_eye: vec3<f32>,
     @location(1) tangent: vec3<f32>,
     // Along the strand, value of the heat map, moisture, density of strands around.
     @location(2) along: vec4<f32>,
@@ -40,6 +36,8 @@ struct ForwardVertex {
 
 struct Fragment {
     @location(0) color: vec4<f32>,
+    // Which way it lies on the screen, see `pass.rs`.
+    @location(1) mark: vec4<f32>,
 #ifdef HAIR_DEPTH
     @builtin(sample_mask) samples: u32,
 #endif
@@ -53,8 +51,8 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> F
         out.position = vec4(0.0, 0.0, 0.0, 1.0);
         return out;
     }
-    out.world_position = vertex.center;
-    out.position = position_world_to_clip(vertex.world_position);
+    out.from_eye = vertex.center;
+    out.position = in_clip(vertex.from_eye);
     out.tangent = vertex.tangent;
     out.outward = vertex.outward;
     out.instance = instance;
@@ -80,14 +78,19 @@ fn heat(value: f32) -> vec3<f32> {
     return select(pow((srgb + 0.055) / 1.055, vec3(2.4)), srgb / 12.92, srgb <= vec3(0.04045));
 }
 
-#ifdef HAIR_MARKED
 // The direction of a strand on the screen, whose y goes down.
-fn way_on_screen(fibre: Fibre) -> vec2<f32> {
-    let place = position_world_to_clip(fibre.position);
-    let along = view.clip_from_world * vec4(fibre.tangent, 0.0);
+fn way_on_screen(from_eye: vec3<f32>, tangent: vec3<f32>) -> vec2<f32> {
+    let place = in_clip(from_eye);
+    let along = view.clip_from_world * vec4(tangent, 0.0);
     return (along.xy * place.w - place.xy * along.w) * view.viewport.zw * vec2(1.0, -1.0);
 }
-#endif
+
+// Up or down, and none along the line of sight.
+fn mark_of(way: vec2<f32>) -> vec4<f32> {
+    let square = dot(way, way);
+    let twice = vec2(way.x * way.x - way.y * way.y, 2.0 * way.x * way.y) / max(square, 1e-30);
+    return vec4(select(vec2(0.5), 0.5 + 0.5 * twice, square > 1e-20), 1.0, 1.0);
+}
 
 @fragment
 fn fragment(in: ForwardVertex) -> Fragment {
@@ -97,16 +100,20 @@ fn fragment(in: ForwardVertex) -> Fragment {
     if out.samples == 0u {
         discard;
     }
-    // Seen for the frames until the other draw's shader is compiled.
-    out.color = vec4(0.05 * exp(-ribbon.root_absorption), 1.0);
+#ifdef HAIR_MARKED
+    out.mark = mark_of(way_on_screen(in.from_eye, in.tangent));
+#else
+    out.mark = vec4(0.5, 0.5, 0.0, 0.0);
+#endif
 #else ifdef HAIR_HEAT
     out.color = vec4(heat(in.along.y), 1.0);
 #else
     var fibre: Fibre;
-    fibre.position = in.world_position;
+    fibre.from_eye = in.from_eye;
+    fibre.position = view.world_position + in.from_eye;
     fibre.frag_coord = in.position;
     fibre.tangent = safe_normalize(in.tangent, vec3(0.0, 1.0, 0.0));
-    fibre.eye = toward_eye(in.world_position);
+    fibre.eye = toward_eye(in.from_eye);
     fibre.normal = facing_normal(fibre.tangent, fibre.eye);
     fibre.along = in.along.x;
     fibre.seed = in.seed.x;
@@ -127,12 +134,9 @@ fn fragment(in: ForwardVertex) -> Fragment {
 
     var pbr = pbr_input_new();
     pbr.frag_coord = in.position;
-    pbr.world_position = vec4(in.world_position, 1.0);
+    pbr.world_position = vec4(fibre.position, 1.0);
     pbr.material.flags |= STANDARD_MATERIAL_FLAGS_FOG_ENABLED_BIT;
     out.color = main_pass_post_lighting_processing(pbr, vec4(lit, 1.0));
-#ifdef HAIR_MARKED
-    out.color.a = marked(way_on_screen(fibre), vec2<i32>(in.position.xy), f32(SAMPLES));
-#endif
 #endif
     return out;
 }

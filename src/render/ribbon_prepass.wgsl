@@ -1,7 +1,6 @@
 // Hair in shadow maps, as seen from the light, and in the camera's prepasses: depth, normals, motion.
 
-#import bevy_pbr::view_transformations::position_world_to_clip
-#import bevy_keratin::ribbon::{ribbon_vertex, toward_eye, facing_normal}
+#import bevy_keratin::ribbon::{ribbon_vertex, in_clip, toward_eye, facing_normal}
 #import bevy_keratin::coverage::covered_samples
 #ifdef MOTION_VECTOR_PREPASS
 #import bevy_keratin::ribbon::place_before
@@ -17,8 +16,8 @@ struct PrepassVertex {
     @location(2) world_normal: vec3<f32>,
 #endif
 #ifdef MOTION_VECTOR_PREPASS
-    @location(3) world_position: vec3<f32>,
-    @location(4) previous_world_position: vec3<f32>,
+    @location(3) from_eye: vec3<f32>,
+    @location(4) previous_from_eye: vec3<f32>,
 #endif
 #ifdef UNCLIPPED_DEPTH_ORTHO_EMULATION
     @location(5) unclipped_depth: f32,
@@ -42,15 +41,15 @@ struct PrepassFragment {
 fn vertex(@builtin(instance_index) instance: u32, @location(0) corner: u32) -> PrepassVertex {
     var out: PrepassVertex;
     let ribbon = ribbon_vertex(corner, instance);
-    out.position = position_world_to_clip(ribbon.world_position);
+    out.position = in_clip(ribbon.from_eye);
     out.share = vec2(ribbon.share, ribbon.grown);
     out.seed = ribbon.seed;
 #ifdef NORMAL_PREPASS_OR_DEFERRED_PREPASS
     out.world_normal = facing_normal(ribbon.tangent, toward_eye(ribbon.center));
 #endif
 #ifdef MOTION_VECTOR_PREPASS
-    out.world_position = ribbon.world_position;
-    out.previous_world_position = place_before(ribbon, corner, instance);
+    out.from_eye = ribbon.from_eye;
+    out.previous_from_eye = place_before(ribbon, corner, instance);
 #endif
     if !ribbon.shown {
         out.position = vec4(0.0, 0.0, 0.0, 1.0);
@@ -73,9 +72,9 @@ fn fragment(in: PrepassVertex) -> PrepassFragment {
     out.normal = vec4(in.world_normal * 0.5 + 0.5, 1.0);
 #endif
 #ifdef MOTION_VECTOR_PREPASS
-    let now = view.unjittered_clip_from_world * vec4(in.world_position, 1.0);
+    let now = view.unjittered_clip_from_world * vec4(view.world_position + in.from_eye, 1.0);
     let before = prepass_bindings::previous_view_uniforms.clip_from_world
-        * vec4(in.previous_world_position, 1.0);
+        * vec4(view.world_position + in.previous_from_eye, 1.0);
     // Across the screen, whose y goes down.
     out.motion = (now.xy / now.w - before.xy / before.w) * vec2(0.5, -0.5);
 #endif

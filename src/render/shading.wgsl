@@ -10,6 +10,12 @@
 #ifdef ENVIRONMENT_MAP
 #import bevy_pbr::environment_map
 #endif
+#ifdef IRRADIANCE_VOLUME
+#import bevy_pbr::irradiance_volume::irradiance_volume_light
+#endif
+#ifdef ATMOSPHERE
+#import bevy_pbr::atmosphere::functions::{calculate_visible_sun_ratio, clamp_to_surface}
+#endif
 #import bevy_render::maths::PI
 #import bevy_keratin::strands::{ribbon, frame, hash, DrawnSolid}
 #import bevy_keratin::fibre::{
@@ -19,7 +25,9 @@
 #import bevy_keratin::volume::{VolumePlace, light_in_volume, fibres_toward}
 
 struct Fibre {
+    // In the world, and to there from the eye, which is exact far from the origin too.
     position: vec3<f32>,
+    from_eye: vec3<f32>,
     frag_coord: vec4<f32>,
     tangent: vec3<f32>,
     eye: vec3<f32>,
@@ -171,7 +179,7 @@ fn reflected(fibre: Fibre, surface: Surface, l: vec3<f32>, arrival: Arrival) -> 
 fn way_of(fibre: Fibre, l: vec3<f32>) -> Way {
     let lt = dot(l, fibre.tangent);
     let sine = sqrt(max(1.0 - lt * lt, 0.0));
-    return Way(fibre.position, fibre.density * sine, min(abs(lt) / max(sine, 0.1), 3.0));
+    return Way(fibre.from_eye, fibre.density * sine, min(abs(lt) / max(sine, 0.1), 3.0));
 }
 
 // What a shadow map says of a light's way, with the number of fibres from the grid: the map knows how far away
@@ -212,6 +220,21 @@ fn uncounted(fibre: Fibre, l: vec3<f32>, light: vec4<f32>) -> Arrival {
 // How far away the sun is (m).
 const FAR: f32 = 1e6;
 
+// How much of a sun's light the air lets through to a place, as Bevy has it for other things.
+fn through_air(id: u32, position: vec3<f32>) -> vec3<f32> {
+#ifdef ATMOSPHERE
+    let sun = &view_bindings::lights.directional_lights[id];
+    let air = view_bindings::atmosphere;
+    let place = clamp_to_surface(air, (air.world_to_atmosphere * vec4(position, 1.0)).xyz);
+    let height = length(place);
+    let up = dot((*sun).direction_to_light, place / height);
+    return lighting::sample_transmittance_lut(height, up)
+        * calculate_visible_sun_ratio(air, height, up, (*sun).sun_disk_angular_size);
+#else
+    return vec3(1.0);
+#endif
+}
+
 // How much of the way of light from a place is free of a solid: 0 where it goes through its middle.
 fn beside(solid: DrawnSolid, place: vec4<f32>, l: vec3<f32>, away: f32) -> f32 {
     let begin = vec3(dot(solid.x, place), dot(solid.y, place), dot(solid.z, place));
@@ -250,7 +273,7 @@ fn past_solids(fibre: Fibre, l: vec3<f32>, away: f32) -> f32 {
 
 fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32> {
     let light = &view_bindings::clustered_lights.data[id];
-    let way = (*light).position_radius.xyz - fibre.position;
+    let way = (*light).position_radius.xyz - view.world_position - fibre.from_eye;
     let square = dot(way, way);
     let l = way * inverseSqrt(max(square, 1e-8));
     var strength = lighting::getDistanceAttenuation(square, (*light).color_inverse_square_range.w);
@@ -280,13 +303,21 @@ fn local_light(id: u32, spot: bool, fibre: Fibre, surface: Surface) -> vec3<f32>
     return reflected(fibre, surface, l, p) * (*light).color_inverse_square_range.rgb * strength;
 }
 
+// How much of what the cuticle would mirror irradiance volumes do not stand for: all where a sky does, else what Bevy takes
+// from a sky for its roughness.
+#ifdef ENVIRONMENT_MAP
+const UNMIRRORED: f32 = 1.0;
+#else
+const UNMIRRORED: f32 = 0.32;
+#endif
+
 // How open the grid says it is where the eye sees a plane layer.
 const OPEN_PLANE: f32 = 0.36;
 
 fn lit_hair(fibre: Fibre) -> vec3<f32> {
     let surface = surface_of(fibre);
     let orthographic = view.clip_from_view[3][3] == 1.0;
-    let view_z = (view.view_from_world * vec4(fibre.position, 1.0)).z;
+    let view_z = (view.view_from_world * vec4(fibre.from_eye, 0.0)).z;
     let cluster = clustering::view_fragment_cluster_index(fibre.frag_coord.xy, view_z, orthographic);
     var ranges = clustering::unpack_clusterable_object_index_ranges(cluster);
 
@@ -307,12 +338,13 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         } else {
             p = counted(sun_passage(i, hair, view_z), fibre, hair, l, vec4(l, 0.0));
         }
-        light += reflected(fibre, surface, l, p) * (*sun).color.rgb * past_solids(fibre, l, FAR);
+        light += reflected(fibre, surface, l, p) * (*sun).color.rgb * through_air(i, fibre.position)
+            * past_solids(fibre, l, FAR);
     }
     // A rectangle is a point at its middle that shines to its front, spread by its size.
     for (var i = 0u; i < lights.n_rect_lights; i++) {
         let panel = &view_bindings::lights.rect_lights[i];
-        let way = (*panel).position - fibre.position;
+        let way = (*panel).position - view.world_position - fibre.from_eye;
         let square = max(dot(way, way), 1e-8);
         let l = way * inverseSqrt(square);
         let front = saturate(dot(cross((*panel).up, (*panel).right), -l));
@@ -336,6 +368,15 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
         normal = mean * inverseSqrt(max(dot(mean, mean), 1e-12));
     }
     var indirect = lights.ambient_color.rgb * (surface.reflectance + surface.transmittance);
+    // Irradiance volumes take the place of the sky's matt light.
+    var has_volume = false;
+#ifdef IRRADIANCE_VOLUME
+    has_volume = true;
+    // What the cuticle mirrors comes from a sky, where there is one.
+    let matt = surface.reflectance - UNMIRRORED * min(backward_share(surface.optics), surface.reflectance).b;
+    indirect += matt * irradiance_volume_light(fibre.position, normal, &ranges)
+        + surface.transmittance * irradiance_volume_light(fibre.position, -normal, &ranges);
+#endif
 #ifdef ENVIRONMENT_MAP
     // The cuticle mirrors about the normal, stretched along the fibre; the rest comes out as from
     // a matt body.
@@ -352,14 +393,14 @@ fn lit_hair(fibre: Fibre) -> vec3<f32> {
     input.F0_dielectric = vec3(mirrored);
     input.F0_metallic = vec3(0.0);
     input.F_ab = lighting::F_AB(input.layers[0].perceptual_roughness, input.layers[0].NdotV);
-    let surround = environment_map::environment_map_light(&input, &ranges, false);
+    let surround = environment_map::environment_map_light(&input, &ranges, has_volume);
     indirect += surround.diffuse + surround.specular;
     // And what shines through from behind.
     input.layers[0].N = -normal;
     input.layers[0].R = -fibre.eye;
     input.diffuse_color = surface.transmittance;
     input.F0_dielectric = vec3(0.0);
-    indirect += environment_map::environment_map_light(&input, &ranges, false).diffuse;
+    indirect += environment_map::environment_map_light(&input, &ranges, has_volume).diffuse;
 #endif
     return view.exposure * (light + indirect * open);
 }

@@ -1,17 +1,28 @@
 // Hair averaged along its strands (Cabral & Leedom 1993, "Imaging vector fields using line integral convolution").
 
 #import bevy_core_pipeline::fullscreen_vertex_shader::FullscreenVertexOutput
-#import bevy_keratin::marks::{Mark, mark_of}
 
 // Of `smoothing.rs`.
 struct Smooth {
     reach: f32,
     across: f32,
-    samples: f32,
 }
 
 @group(0) @binding(0) var screen: texture_2d<f32>;
+// Of `pass.rs`.
+@group(0) @binding(1) var marks: texture_2d<f32>;
 @group(0) @binding(2) var<uniform> smooth_by: Smooth;
+
+// Share of a pixel's samples that are hair; twice the angle of its direction, as long as the share.
+struct Mark {
+    share: f32,
+    twice: vec2<f32>,
+}
+
+fn mark_of(pixel: vec2<i32>) -> Mark {
+    let mark = textureLoad(marks, pixel, 0);
+    return Mark(mark.b, 2.0 * mark.rg - 1.0);
+}
 
 fn inside(pixel: vec2<i32>) -> vec2<i32> {
     return clamp(pixel, vec2(0), vec2<i32>(textureDimensions(screen)) - 1);
@@ -22,7 +33,7 @@ fn mark_around(pixel: vec2<i32>) -> Mark {
     var sum = Mark(0.0, vec2(0.0));
     for (var i = 0; i < 9; i++) {
         let at = inside(pixel + vec2(i % 3 - 1, i / 3 - 1));
-        let mark = mark_of(textureLoad(screen, at, 0).a, at, smooth_by.samples);
+        let mark = mark_of(at);
         sum.share += mark.share;
         sum.twice += mark.twice;
     }
@@ -30,32 +41,34 @@ fn mark_around(pixel: vec2<i32>) -> Mark {
 }
 
 struct Sum {
-    color: vec3<f32>,
+    color: vec4<f32>,
     // Of it, that is hair.
     share: f32,
     // The color of pixels without hair, and how much of the weight they have.
     bare: vec4<f32>,
+    bare_weight: f32,
     weight: f32,
 }
 
 fn joined(a: Sum, b: Sum) -> Sum {
-    return Sum(a.color + b.color, a.share + b.share, a.bare + b.bare, a.weight + b.weight);
+    return Sum(a.color + b.color, a.share + b.share, a.bare + b.bare,
+        a.bare_weight + b.bare_weight, a.weight + b.weight);
 }
 
 fn scaled(a: Sum, by: f32) -> Sum {
-    return Sum(by * a.color, by * a.share, by * a.bare, by * a.weight);
+    return Sum(by * a.color, by * a.share, by * a.bare, by * a.bare_weight, by * a.weight);
 }
 
 // A pixel, and a little of those beside it.
 fn line(pixel: vec2<i32>, across: vec2<i32>) -> Sum {
-    var sum = Sum(vec3(0.0), 0.0, vec4(0.0), 0.0);
+    var sum = Sum(vec4(0.0), 0.0, vec4(0.0), 0.0, 0.0);
     for (var side = -1; side <= 1; side++) {
         let at = inside(pixel + side * across);
         let color = textureLoad(screen, at, 0);
-        let share = mark_of(color.a, at, smooth_by.samples).share;
+        let share = mark_of(at).share;
         let weight = select(smooth_by.across, 1.0, side == 0);
-        let bare = select(vec4(0.0), weight * vec4(color.rgb, 1.0), share == 0.0);
-        sum = joined(sum, Sum(weight * color.rgb, weight * share, bare, weight));
+        let bare = select(0.0, weight, share == 0.0);
+        sum = joined(sum, Sum(weight * color, weight * share, bare * color, bare, weight));
     }
     return sum;
 }
@@ -66,6 +79,9 @@ fn fragment(in: FullscreenVertexOutput) -> @location(0) vec4<f32> {
     let own = textureLoad(screen, pixel, 0);
     let here = mark_around(pixel);
     if here.share == 0.0 {
+#ifdef MULTISAMPLED
+        discard;
+#endif
         return own;
     }
     // One pixel along the longer axis.
@@ -90,8 +106,8 @@ fn fragment(in: FullscreenVertexOutput) -> @location(0) vec4<f32> {
     }
     var color = sum.color / sum.weight;
     // Where no strand is, the ground of this place is seen, not of those along the line.
-    if mark_of(own.a, pixel, smooth_by.samples).share == 0.0 {
-        color += (1.0 - sum.share / sum.weight) * (own.rgb - sum.bare.rgb / max(sum.bare.w, 1e-6));
+    if mark_of(pixel).share == 0.0 {
+        color += (1.0 - sum.share / sum.weight) * (own - sum.bare / max(sum.bare_weight, 1e-6));
     }
-    return vec4(color, 1.0);
+    return color;
 }

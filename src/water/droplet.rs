@@ -44,6 +44,8 @@ setting! {
         pub r_max: f32 = 1e-3 * INFLUENCE, "m" in R_MAX: 1e-6..=10.0,
             "more than r_min, usually five times as much";
         pub(super) ride: Option<StrandPoint> = None => Ranged::clamp_values;
+        /// The hair that carries it, or that it came off.
+        pub(super) hair: Option<Entity> = None;
         /// Where it was a substep ago.
         pub(super) before: Vec3 = Vec3::ZERO, "m" in BEFORE: -1e6..=1e6, "where it was";
         /// For how long it has yet to move (s); negative where it came into being within a substep.
@@ -139,6 +141,11 @@ impl Droplet {
         self.ride
     }
 
+    /// The [`Hair`](crate::Hair) that carries it or that it came off, if any: it is drawn where that is.
+    pub fn hair(&self) -> Option<Entity> {
+        self.hair
+    }
+
     /// Strength of its pull: 1 if its radius is at least r_min, less once it has lost water.
     pub fn strength(&self) -> f32 {
         (self.radius() / self.r_min).min(1.0)
@@ -161,6 +168,9 @@ impl Droplet {
         tape.values([&mut self.r_min, &mut self.r_max, &mut self.lag, &mut self.lying]);
         tape.value(&mut self.touch_count);
         tape.flags([&mut self.drip]);
+        let mut hair = self.hair.unwrap_or(Entity::PLACEHOLDER);
+        tape.entity(&mut hair);
+        self.hair = (hair != Entity::PLACEHOLDER).then_some(hair);
         let mut is_carried = self.ride.is_some();
         tape.flags([&mut is_carried]);
         if !is_carried {

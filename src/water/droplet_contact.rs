@@ -219,6 +219,7 @@ pub(super) fn wet_strands(
             && let Ok((_, of, mut strand, mut added_mass, ..)) = strands.get_mut(ride.strand)
             && let Ok((_, pose, ..)) = hairs.get(of.0)
         {
+            drop.hair = Some(of.0);
             let (pose, wetting) = (pose.now(), wetting.of(of.0));
             let (strand, added_mass) =
                 (strand.bypass_change_detection(), added_mass.bypass_change_detection());

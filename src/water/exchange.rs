@@ -121,6 +121,7 @@ pub(super) fn run_showers(
 
 /// The conditions for water in the frame of one hair in a tick.
 struct LocalWater<'a> {
+    hair: Entity,
     wetting: HairWetting,
     pose: Pose,
     winds: LocalWinds,
@@ -241,7 +242,14 @@ pub(super) fn exchange_water(
             let conditions = WaterConditions::new(wetting, gravity, &air, dt, process);
             Passing { conditions, bonds_follow: wetting.bonds_follow(process * dt) }
         });
-        Some(LocalWater { wetting, pose, winds, steps, to_come: wetting.bonds_follow(PERIOD) })
+        Some(LocalWater {
+            hair,
+            wetting,
+            pose,
+            winds,
+            steps,
+            to_come: wetting.bonds_follow(PERIOD),
+        })
     };
     let done = for_each_part(EXCHANGE, tables(&mut strands), Vec::new, |items, rows| {
         let (mut waters, mut done) = (PerHair::default(), Done::default());
@@ -283,9 +291,10 @@ pub(super) fn exchange_water(
             done.evaporated += wet.loss.evaporated;
             done.merged += wet.loss.merged;
             done.removed += wet.removed;
-            let LocalWater { pose, wetting, .. } = &waters.values[hair];
+            let LocalWater { hair, pose, wetting, .. } = &waters.values[hair];
             done.drips.extend(wet.loss.drips.iter().map(|&(node, volume)| {
-                detached_drop(pose, wet.strand, node as f32, volume, wetting, gravity)
+                let drop = detached_drop(pose, wet.strand, node as f32, volume, wetting, gravity);
+                Droplet { hair: Some(*hair), ..drop }
             }));
         }
         done

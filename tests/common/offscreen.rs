@@ -136,6 +136,11 @@ impl Offscreen {
         Self::with_plugins(width, height, HairPlugins::default().build())
     }
 
+    /// The same without the hair's plugins.
+    pub fn without_hair(width: u32, height: u32) -> Self {
+        Self::of(width, height, bevy::app::NoopPluginGroup.build(), windowless(), false)
+    }
+
     /// The same with the hair's plugins added before Bevy's.
     pub fn with_hair_first(width: u32, height: u32) -> Self {
         Self::of(width, height, HairPlugins::default().build(), windowless(), true)
@@ -182,6 +187,11 @@ impl Offscreen {
         app.cleanup();
         read_shaders(&mut app);
         Self { app, camera, target }
+    }
+
+    /// The image that the camera draws into.
+    pub fn target(&self) -> Handle<Image> {
+        self.target.clone()
     }
 
     /// Runs `ticks` fixed ticks with every frame from now on.

@@ -16,7 +16,10 @@ use bevy::{
         view::NoIndirectDrawing,
     },
 };
-use bevy_keratin::{prelude::*, render::HairBuffers};
+use bevy_keratin::{
+    prelude::*,
+    render::{HairBuffers, HairPhase},
+};
 
 /// In how many draw calls of how many views an entity takes part.
 fn draws<I: BinnedPhaseItem>(scene: &Offscreen, drawn: Entity) -> (usize, usize) {
@@ -64,9 +67,11 @@ pub fn a_hair_is_one_draw_call_in_every_view_and_one_of_depth_before_it_in_pictu
         let drawn = world.get::<HairBuffers>(hair).unwrap().drawn;
         let depth = world.get::<Children>(drawn).unwrap()[0];
         // What is seen is found out first, then lit.
-        assert_eq!(draws::<Opaque3d>(&scene, depth), (1, 1));
+        assert_eq!(draws::<HairPhase<false>>(&scene, depth), (1, 1));
+        assert_eq!(draws::<Opaque3d>(&scene, depth), (0, 0), "in a pass of their own");
+        assert_eq!(draws::<AlphaMask3d>(&scene, drawn), (0, 0));
         assert_eq!(draws::<Shadow>(&scene, depth), (0, 0));
-        let camera = draws::<AlphaMask3d>(&scene, drawn);
+        let camera = draws::<HairPhase<true>>(&scene, drawn);
         let prepass = draws::<AlphaMask3dPrepass>(&scene, drawn);
         let (shadow, views) = draws::<Shadow>(&scene, drawn);
         println!(

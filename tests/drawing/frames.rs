@@ -501,6 +501,7 @@ pub fn water_is_drawn_as_beads_as_long_as_there_is_any() {
         position: Vec3::new(x, y, 0.0),
         radius: 15e-3,
         velocity,
+        layers_of: None,
     };
     #[derive(Resource, Default)]
     struct Wanted(Vec<Bead>);

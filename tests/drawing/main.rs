@@ -28,6 +28,7 @@ mod cut;
 mod dye;
 mod fibre;
 mod frames;
+mod games;
 mod groom;
 mod light;
 mod look;
@@ -91,6 +92,19 @@ device::tests! {
             soaked_hair_is_darker_and_droplets_are_seen,
             views_do_not_disturb_each_other_nor_does_a_minimised_window;
         alone: hair_and_water_outlive_a_lost_device;
+    }
+    games {
+        device: layers_of_a_hair_and_of_its_wearer_hide_it_and_its_shadow,
+            drops_are_seen_where_their_hair_is_or_where_they_say,
+            an_irradiance_volume_lights_hair_as_a_sky_does,
+            lights_of_another_layer_leave_hair_as_it_was,
+            foliage_is_as_without_the_plugin_and_beside_hair,
+            hair_behind_a_pane_is_hair_and_pane,
+            a_second_camera_leaves_the_first_ones_picture,
+            a_camera_laid_over_leaves_what_is_below,
+            a_transparent_picture_has_the_coverage_of_its_hair,
+            a_close_up_far_from_the_origin_is_as_at_it,
+            what_lights_hair_compiles_for_cameras_in_air;
     }
     groom {
         device: followers_are_drawn_where_they_are_given_and_no_more_than_asked_for;

@@ -1,6 +1,8 @@
 //! The lights towards which fibres are counted.
 
-use bevy::{ecs::system::SystemParam, light::RectLight, prelude::*};
+use bevy::{
+    camera::visibility::RenderLayers, ecs::system::SystemParam, light::RectLight, prelude::*,
+};
 
 /// How many for each hair; the others' light goes through a plane layer.
 pub(crate) const LIGHTS: usize = 4;
@@ -14,7 +16,7 @@ pub(crate) struct BrightLights<'w, 's> {
     panels: Query<'w, 's, (&'static RectLight, Seen)>,
 }
 
-type Seen = (&'static GlobalTransform, &'static InheritedVisibility);
+type Seen = (&'static GlobalTransform, &'static InheritedVisibility, Option<&'static RenderLayers>);
 
 /// A light and how strongly it shines on a hair (lx).
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,29 +27,35 @@ struct Bright {
 }
 
 impl BrightLights<'_, '_> {
-    /// The brightest ones for a hair within `radius` of `center`, in the world's frame: their place and 1, or the
-    /// way to them and 0. As many as there are, the rest is zero.
-    pub(crate) fn at(&self, center: Vec3, radius: f32) -> [Vec4; LIGHTS] {
-        let local = |(place, seen): (&GlobalTransform, &InheritedVisibility), intensity, range| {
-            let from = place.translation();
+    /// The brightest ones for a hair within `radius` of `center`, of those that shine in pictures of these layers, in
+    /// the world's frame: their place and 1, or the way to them and 0. As many as there are, the rest is zero.
+    pub(crate) fn at(&self, center: Vec3, radius: f32, layers: &RenderLayers) -> [Vec4; LIGHTS] {
+        // Bevy asks for the layers of a camera, not of what it sees.
+        type Of<'a> = (&'a GlobalTransform, &'a InheritedVisibility, Option<&'a RenderLayers>);
+        let shines = |of: Of| of.1.get() && of.2.unwrap_or_default().intersects(layers);
+        let local = |of: Of, intensity, range| {
+            let from = of.0.translation();
             let away = from.distance(center);
-            let reaches = seen.get() && away - radius < range;
+            let reaches = shines(of) && away - radius < range;
             let lux = if reaches { intensity / (away * away).max(1e-4) } else { 0.0 };
             Bright { place: from.extend(1.0), lux }
         };
-        let suns = self.suns.iter().map(|(sun, (place, seen))| Bright {
-            place: Vec3::from(place.back()).extend(0.0),
-            lux: if seen.get() { sun.illuminance } else { 0.0 },
+        let suns = self.suns.iter().map(|(sun, of)| Bright {
+            place: Vec3::from(of.0.back()).extend(0.0),
+            lux: if shines(of) { sun.illuminance } else { 0.0 },
         });
-        let spots = self.spots.iter().filter(|(spot, (place, _))| {
+        let spots = self.spots.iter().filter(|(spot, (place, ..))| {
             // Its cone touches the ball around the hair.
             let way = center - place.translation();
             let wide = (radius / way.length().max(1e-6)).min(1.0).asin();
             way.angle_between(place.forward().into()) < spot.outer_angle + wide
         });
-        let spots = spots.map(|(spot, seen)| local(seen, spot.intensity, spot.range));
-        let points = self.points.iter().map(|(of, seen)| local(seen, of.intensity, of.range));
-        let panels = self.panels.iter().map(|(of, seen)| local(seen, of.intensity, of.range));
+        let spots = spots.map(|(spot, of)| local(of, spot.intensity, spot.range));
+        let points = self.points.iter().map(|(light, of)| local(of, light.intensity, light.range));
+        // Bevy 0.19 asks for no layers of these.
+        let panels = self.panels.iter().map(|(light, (place, seen, _))| {
+            local((place, seen, Some(layers)), light.intensity, light.range)
+        });
 
         let mut brightest = [Bright::default(); LIGHTS];
         for light in suns.chain(spots).chain(points).chain(panels) {
@@ -70,7 +78,11 @@ mod tests {
     use bevy::ecs::system::RunSystemOnce;
 
     fn brightest(world: &mut World) -> [Vec4; LIGHTS] {
-        world.run_system_once(|lights: BrightLights| lights.at(Vec3::ZERO, 0.1)).unwrap()
+        world
+            .run_system_once(|lights: BrightLights| {
+                lights.at(Vec3::ZERO, 0.1, &RenderLayers::layer(0))
+            })
+            .unwrap()
     }
 
     #[test]
@@ -83,6 +95,7 @@ mod tests {
         world.spawn((point(1000.0), at(1.0), seen));
         world.spawn((point(1e9), at(30.0), seen));
         world.spawn((point(1e9), at(1.5), InheritedVisibility::HIDDEN));
+        world.spawn((point(1e9), at(1.5), seen, RenderLayers::layer(1)));
         let spot = SpotLight { intensity: 1e6, range: 20.0, outer_angle: 0.3, ..default() };
         let looking = |target: Vec3| {
             GlobalTransform::from(Transform::from_xyz(0.0, 3.0, 0.0).looking_at(target, Vec3::X))
