@@ -2,7 +2,6 @@
 
 use super::{
     HairFollowers, HairView,
-    pass::MARKS,
     ribbon_mesh::{CORNER, DrawOrder},
     rings::Rings,
     thickness::{PIECES, Thickness},
@@ -16,13 +15,17 @@ use bevy::{
     render::{
         render_resource::{
             AsBindGroup, ColorTargetState, ColorWrites, CompareFunction, RenderPipelineDescriptor,
-            ShaderType, SpecializedMeshPipelineError,
+            ShaderType, SpecializedMeshPipelineError, TextureFormat,
         },
         storage::ShaderBuffer,
     },
     shader::{ShaderDefVal, ShaderRef},
 };
 use core::marker::PhantomData;
+
+/// Of marks, see [`smoothing`](super::smoothing): twice the angle of a strand on the screen as cosine and sine, each halved
+/// and from one half up, and 1.
+pub(super) const MARKS: TextureFormat = TextureFormat::Rgba8Unorm;
 
 /// Which of a camera's two draws of hair a material is for.
 pub(super) trait Draw: TypePath + Clone + core::fmt::Debug + Send + Sync + 'static {

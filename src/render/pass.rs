@@ -4,7 +4,7 @@
 //! In it each hair is drawn twice: its depth, by which it is found out which strands are seen, with marks that tell
 //! [`smoothing`](super::smoothing) which samples are hair and which way it lies; then its light.
 
-use super::material::{Depth, Lit, RibbonMaterial};
+use super::material::{Depth, Lit, MARKS, RibbonMaterial};
 use bevy::{
     camera::{MainPassResolutionOverride, Viewport},
     core_pipeline::{
@@ -31,8 +31,8 @@ use bevy::{
         },
         render_resource::{
             CachedRenderPipelineId, LoadOp, Operations, RenderPassColorAttachment,
-            RenderPassDescriptor, StoreOp, TextureDescriptor, TextureDimension, TextureFormat,
-            TextureUsages, TextureView,
+            RenderPassDescriptor, StoreOp, TextureDescriptor, TextureDimension, TextureUsages,
+            TextureView,
         },
         renderer::{RenderContext, RenderDevice, ViewQuery},
         sync_world::MainEntity,
@@ -244,9 +244,6 @@ fn queue(
         }
     }
 }
-
-/// Of marks: twice the angle of a strand on the screen as cosine and sine, each halved and from one half up, and 1.
-pub(super) const MARKS: TextureFormat = TextureFormat::Rgba8Unorm;
 
 /// A view's marks, where it sees hair.
 #[derive(Component)]
