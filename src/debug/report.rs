@@ -50,8 +50,7 @@ impl Plugin for ReportPlugin {
 /// }
 /// ```
 ///
-/// A whole head of 500 strands of 16 nodes takes about 0.1 ms. Hair on the GPU is reported as it was when it was last
-/// read back.
+/// Hair on the GPU is reported as it was when it was last read back.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Component, Default, Clone, PartialEq)]
 pub struct HairReport {

@@ -82,7 +82,7 @@ impl Done {
         ties.sort_unstable();
         ties.dedup();
         let watched = world.get::<HairStyle>(hair).copied().zip(world.get(hair).cloned());
-        (!strands.is_empty()).then(|| Self {
+        (!strands.is_empty()).then_some(Self {
             hair,
             hairdo: Hairdo { strands, ..whole },
             styles,
