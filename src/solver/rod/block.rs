@@ -172,7 +172,7 @@ impl BlockLanes {
     }
 
     /// The obstacles that any lane may touch in a step of `dt`, and their places among all.
-    pub(super) fn obstacles_near<'a>(
+    fn obstacles_near<'a>(
         &self,
         obstacles: &'a [Obstacle],
         dt: f32,

@@ -38,7 +38,7 @@ pub(crate) fn choose_near<S: Simd>(
         balls.clear();
     } else {
         let whole = ball_around(simd, b);
-        ObstacleBalls::collect(&mut balls, b.obstacles_near(obstacles, dt, clearance), whole);
+        ObstacleBalls::collect(&mut balls, obstacles.iter().enumerate(), whole);
     }
     b.obstacle_balls = balls;
     if b.obstacle_balls.is_empty() {
