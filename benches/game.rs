@@ -103,6 +103,8 @@ fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
     let hair = person(&mut app, preset, &strands, Vec3::ZERO);
     let contact = preset.settings().contact;
     let without = StrandContact { strength: 0.0, ..contact };
+    let pairs = StrandContact { method: ContactMethod::Pairs, ..contact };
+    let soft = StrandContact { core: 0.0, ..pairs };
     settle(&mut app);
     for moving in [false, true] {
         if moving {
@@ -110,12 +112,13 @@ fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
             settle(&mut app);
         }
         let state = if moving { "moving" } else { "at rest" };
-        let [on, off] = in_turns(&mut app, |app, turn| {
-            let contact = if turn == 0 { contact } else { without };
-            app.world_mut().entity_mut(hair).insert(contact);
+        let all = [contact, pairs, soft, without];
+        let rows = in_turns(&mut app, |app, turn| {
+            app.world_mut().entity_mut(hair).insert(all[turn]);
         });
-        println!("{name} {state} | {threads} | on | {on:.2}");
-        println!("{name} {state} | {threads} | off | {off:.2}");
+        for (how, ms) in ["on", "by pairs", "pairs, no core", "off"].into_iter().zip(rows) {
+            println!("{name} {state} | {threads} | {how} | {ms:.2}");
+        }
     }
     let nodes = strands.first().map_or(0, Strand::nodes);
     println!("{name}: {} guides of {nodes} nodes", strands.len());

@@ -58,6 +58,7 @@ mod book {
         Blender: "blender.md",
         Character: "character.md",
         Colliders: "colliders.md",
+        Contact: "contact.md",
         Debug: "debug.md",
         FirstHour: "first-hour.md",
         Grooms: "grooms.md",

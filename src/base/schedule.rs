@@ -138,6 +138,7 @@ substep! {
     Projection: "Positions and velocities" {
         Rods: "Cosserat rods: predict, project, limit lengths, velocities (1 to 12)",
         Springs: "Mass-spring strands (\\[W\\] 1)",
+        StrandCores: "Firm cores of strands are kept apart, where contact is by pairs",
         Followers: "Strands that are not simulated follow their guides, once a tick",
     }
     BondUpdate: "Bonds that re-formed remember the present shape (16)" {

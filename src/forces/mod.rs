@@ -9,8 +9,8 @@ pub mod prelude {
     #[cfg(feature = "avian")]
     pub use crate::forces::contact::{AvianHairCollider, AvianShapeError};
     pub use crate::forces::contact::{
-        Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, Openings,
-        StrandContact,
+        Bake, BakeError, ColliderShape, ContactMethod, ConvexHull, DistanceGrid, HairCollider,
+        Openings, StrandContact,
     };
     pub use crate::forces::environment::{
         AirDrag, Blower, HairClimate, HairGravity, HairWind, WindReceived, WindTravel, WindZone,

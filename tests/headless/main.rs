@@ -96,6 +96,7 @@ mod submersion;
 mod swing;
 mod tick;
 mod tie;
+mod touch;
 mod water;
 mod wear;
 mod wearers;

@@ -29,9 +29,14 @@ fn asleep(contact: StrandContact) -> SleepCounts {
 
 #[test]
 fn locks_that_touch_come_to_rest_where_contact_is_mutual() {
+    use ContactMethod::{Mutual, Pairs, Printed};
     let [mutual, printed] =
-        [true, false].map(|mutual| asleep(StrandContact { mutual, ..default() }));
-    println!("mutual {mutual:?}, printed {printed:?}");
+        [Mutual, Printed].map(|method| asleep(StrandContact { method, ..default() }));
+    // Firm cores still keep some awake.
+    let pairs = [0.0, 0.35].map(|core| asleep(StrandContact { method: Pairs, core, ..default() }));
+    println!("mutual {mutual:?}, printed {printed:?}, by pairs {pairs:?}");
+    assert!(10 * pairs[0].awake < pairs[0].asleep, "{pairs:?}");
+    assert!(3 * pairs[1].awake < pairs[1].asleep, "{pairs:?}");
     assert!(3 * mutual.awake < mutual.asleep, "{mutual:?}");
     assert!(2 * mutual.awake < printed.awake, "{mutual:?}, printed {printed:?}");
 }

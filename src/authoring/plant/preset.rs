@@ -10,8 +10,12 @@ use super::{
 #[cfg(feature = "render")]
 use crate::render::{HairFollowers, HairLook};
 use crate::{
-    base::setting::Ranged, forces::contact::StrandContact, hair::look::WornPreset,
-    simulation::settle::Settling, solver::rod::HairStiffness, water::HairWetting,
+    base::setting::Ranged,
+    forces::contact::{ContactMethod, StrandContact},
+    hair::look::WornPreset,
+    simulation::settle::Settling,
+    solver::rod::HairStiffness,
+    water::HairWetting,
 };
 use bevy::prelude::*;
 
@@ -268,8 +272,10 @@ impl HairPreset {
         // Strands of fur are too short to cross each other.
         let contact = match self {
             Self::Fur => StrandContact { strength: 0.0, ..default() },
-            Self::Locs => StrandContact { radius: 3e-3, mutual: true, ..default() },
-            _ => StrandContact { mutual: true, ..default() },
+            Self::Locs => {
+                StrandContact { radius: 3e-3, method: ContactMethod::Mutual, ..default() }
+            }
+            _ => StrandContact { method: ContactMethod::Mutual, ..default() },
         };
         let fibres = HUMAN_DENSITY / self.planting(&Scalp::default()).density;
         PresetSettings {

@@ -198,7 +198,7 @@ fn four<S: Simd>(simd: S, rows: [NodeRow; 4]) -> [f32x4<S>; 4] {
 /// The start nodes of eight edges (with `after` = 1 their end nodes), and the last column of these
 /// rows.
 #[inline(always)]
-fn eight<S: Simd>(
+pub(super) fn eight<S: Simd>(
     simd: S,
     rows: &[NodeRow],
     edges: &[u32; WIDTH],

@@ -9,6 +9,7 @@ mod hat;
 mod lanes;
 pub mod model;
 mod neighbours;
+mod pairs;
 mod reach;
 mod systems;
 
@@ -46,14 +47,35 @@ setting! {
         /// contact between strands off.
         pub strength: f32 = 20.0, "m/s²" in STRENGTH: 0.0..=1e6, safe 0.0..=1e3,
             "20 parts locks gently";
-        /// Whether an edge that pushes a node is pushed back, as presets have it. Contact then keeps momentum, and
-        /// hair whose locks touch comes to rest: each pair counts by halves from both sides, neighbouring edges
-        /// share what is near their common node, and in a step pairs give way by a 25th of their depth at
-        /// most, however many touch. Default `false`, equation 18 as printed, which has none of these. Where lists
-        /// hold more than 256 edges a node in the mean, as with strands by the hundred in one place, contact
-        /// is as printed.
-        pub mutual: bool = false;
+        /// How contact acts.
+        pub method: ContactMethod = ContactMethod::Printed;
+        /// The share of the radius within which strands are firm, with [`ContactMethod::Pairs`]: they do not pass
+        /// each other, but for crowds that fall at once. 0 lets them.
+        pub core: f32 = 0.35, in CORE: 0.0..=0.9, "a third keeps locks from passing each other";
+        /// μ, the friction of strands on each other, with [`ContactMethod::Pairs`]. Of dry hair 0.15 to 0.3.
+        pub friction: f32 = 0.2, in FRICTION: 0.0..=10.0, safe 0.0..=1.0, "0.2 is dry hair";
+        /// What holds strands that touch besides what presses them together, with [`ContactMethod::Pairs`]: dry
+        /// clean hair 0.2, wax 2 to 5, hairspray 5 to 20.
+        pub cohesion: f32 = 0.2, "m/s²" in COHESION: 0.0..=1e3, safe 0.0..=20.0, "0.2 is clean hair";
     }
+}
+
+/// How strands push each other apart.
+#[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[reflect(Default, Clone, PartialEq)]
+pub enum ContactMethod {
+    /// Equation 18 as printed: nodes are pushed by edges, which are not pushed back.
+    #[default]
+    Printed,
+    /// Equation 18 with edges that are pushed back, as presets have it. Contact then keeps momentum, and hair whose
+    /// locks touch comes to rest: each pair counts by halves from both sides, neighbouring edges share what is near
+    /// their common node, and in a step pairs give way by a 25th of their depth at most, however many touch. Where lists
+    /// hold more than 256 edges a node in the mean, as with strands by the hundred in one place, contact is as printed.
+    Mutual,
+    /// Edges against edges, each pair by one impulse on both: strands that cross do not pass each other, friction holds
+    /// them until what presses them together is too little, and how much is pressed does not depend on how finely
+    /// strands are divided. Costs more.
+    Pairs,
 }
 
 /// The colliders near one hair in this substep, in its frame. Written by `Interaction`, read by
@@ -98,6 +120,8 @@ impl Obstacles {
 pub struct LockNeighbours {
     #[reflect(ignore)]
     lists: neighbours::Neighbours,
+    #[reflect(ignore)]
+    pairs: pairs::Pairs,
     /// The strands that take part in this tick, and whether followers are among them.
     #[reflect(ignore)]
     members: (Vec<Entity>, bool),
@@ -117,6 +141,7 @@ impl Film {
 impl LockNeighbours {
     pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
         self.lists.record(tape);
+        self.pairs.record(tape);
     }
 
     /// The number of nodes of the lists.
@@ -145,11 +170,17 @@ impl LockNeighbours {
     /// search.
     #[cfg(feature = "debug")]
     pub(crate) fn touching(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
-        self.lists.touching()
+        self.lists.touching().chain(self.pairs.touching())
     }
 
-    /// How many pairs of node and edge are in the lists, rounded up to groups of eight for each node.
+    /// How many pairs of node and edge are in the lists, rounded up to groups of eight for each node; or of edges,
+    /// where contact is by pairs.
     pub fn pairs(&self) -> usize {
-        self.lists.pairs()
+        self.lists.pairs() + self.pairs.counts()[0]
+    }
+
+    /// How many pairs of edges have pushed in the last substep.
+    pub fn active_pairs(&self) -> usize {
+        self.pairs.counts()[1]
     }
 }

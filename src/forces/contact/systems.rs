@@ -1,11 +1,12 @@
 //! `Interaction`: contact between strands, and colliders in each hair's frame.
 
 use super::{
-    Bake, BakeError, ColliderShape, ConvexHull, DistanceGrid, HairCollider, HullError,
-    LockNeighbours, Obstacles, Openings, StrandContact, coarse,
+    Bake, BakeError, ColliderShape, ContactMethod, ConvexHull, DistanceGrid, HairCollider,
+    HullError, LockNeighbours, Obstacles, Openings, StrandContact, coarse,
     hat::WornHat,
     lanes::Penalty,
     neighbours::Lookup,
+    pairs::{self, InContact, keep_strands_apart},
     reach::{Ball, Colliders, HairReach, LOOK_AGAIN},
 };
 use crate::{
@@ -62,6 +63,7 @@ impl Plugin for ContactPlugin {
         keep_required::<Hair, LockNeighbours>(app);
         keep_required::<Hair, HairReach>(app);
         app.register_type::<ColliderShape>()
+            .register_type::<ContactMethod>()
             .register_type::<ConvexHull>()
             .register_type::<DistanceGrid>()
             .register_type::<HullError>()
@@ -89,6 +91,7 @@ impl Plugin for ContactPlugin {
                         .chain()
                         .in_set(HairSystems::Obstacles),
                     push_strands_apart.in_set(HairSystems::StrandContact),
+                    keep_strands_apart.in_set(HairSystems::StrandCores),
                 ),
             )
             .add_systems(
@@ -96,6 +99,7 @@ impl Plugin for ContactPlugin {
                 (
                     gather_obstacles.in_set(HairSystems::Obstacles),
                     push_strands_apart.in_set(HairSystems::StrandContact),
+                    keep_strands_apart.in_set(HairSystems::StrandCores),
                 ),
             );
     }
@@ -277,6 +281,7 @@ fn too_crowded(radius: f32) -> HairFault {
 /// A hair whose strands may touch in this substep.
 struct Touching<'a> {
     hair: Entity,
+    pose: &'a TickPose,
     members: &'a Strands,
     neighbours: Mut<'a, LockNeighbours>,
     contact: StrandContact,
@@ -287,13 +292,10 @@ struct Touching<'a> {
 
 impl Touching<'_> {
     /// Looks up neighbours and their pushes.
-    fn find<'s, 'w: 's>(
-        &mut self,
-        strands: &'s Query<'w, '_, (&'static Strand, &'static StrandSleep), With<StrandOf>>,
-    ) {
-        let Self { hair, members, neighbours, contact, step, fault } = self;
+    fn find<'s, 'w: 's>(&mut self, strands: &'s Query<'w, '_, InContact, With<StrandOf>>) {
+        let Self { hair, pose, members, neighbours, contact, step, fault } = self;
         let radius = contact.radius;
-        let LockNeighbours { lists: list, members: (present, had_followers), reported } =
+        let LockNeighbours { lists: list, pairs, members: (present, had_followers), reported } =
             neighbours.bypass_change_detection();
         // Followers take no part in contact, but in bridges of water.
         let with_followers = list.has_extra_margin();
@@ -301,11 +303,21 @@ impl Touching<'_> {
         list.clear();
         if step.is_first || with_followers != *had_followers {
             let takes_part = |id: &&Entity| {
-                strands.get(**id).is_ok_and(|(_, sleep)| with_followers || !sleep.is_follower())
+                strands.get(**id).is_ok_and(|of| with_followers || !of.sleep.is_follower())
             };
             present.clear();
             present.extend(members.collection().iter().filter(takes_part));
             *had_followers = with_followers;
+        }
+        let is_paired = contact.method == ContactMethod::Pairs;
+        if is_paired {
+            pairs::find(pairs, strands.iter_many(&*present), contact, pose, step.dt);
+            if pairs.is_crowded() && !core::mem::replace(&mut reported.1, true) {
+                *fault = Some(too_crowded(radius).of(*hair));
+            }
+            if !with_followers {
+                return;
+            }
         }
         // Strands are searched once a tick at most, at their expected positions in the middle of the time until
         // the next search: most move with their neighbours.
@@ -313,8 +325,8 @@ impl Touching<'_> {
         let until = list.lookups() as f32 * step.tick - step.dt;
         let ahead = step.is_first.then_some(0.5 * until);
         for some in present.chunks(TOGETHER) {
-            strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.positions()));
-            for (strand, ..) in strands.iter_many(some) {
+            strands.iter_many(some).for_each(|of| prefetch(of.strand.positions()));
+            for strand in strands.iter_many(some).map(|of| of.strand) {
                 let stride = coarse::stride(strand.rest_lengths(), reach);
                 list.add(strand.positions(), stride);
                 if let Some(seconds) = ahead {
@@ -326,7 +338,9 @@ impl Touching<'_> {
                 }
             }
         }
-        let StrandContact { strength, mutual, .. } = *contact;
+        // What only bridges of water need is not pushed a second time.
+        let strength = if is_paired { 0.0 } else { contact.strength };
+        let mutual = contact.method == ContactMethod::Mutual;
         list.find_pushes(Penalty { reach, strength, mutual, dt: step.dt }, lookup);
         if fault.is_none() && list.is_crowded() && !core::mem::replace(&mut reported.1, true) {
             *fault = Some(too_crowded(radius).of(*hair));
@@ -334,29 +348,52 @@ impl Touching<'_> {
     }
 }
 
+/// The pushes of either method.
+enum Either<P, L> {
+    Pairs(P),
+    Lists(L),
+}
+
+impl<P: Iterator<Item = Vec3>, L: Iterator<Item = Vec3>> Iterator for Either<P, L> {
+    type Item = Vec3;
+
+    fn next(&mut self) -> Option<Vec3> {
+        match self {
+            Self::Pairs(pushes) => pushes.next(),
+            Self::Lists(pushes) => pushes.next(),
+        }
+    }
+}
+
 pub(crate) fn push_strands_apart(
     steps: EffectiveSubsteps,
     contact: Settings<StrandContact>,
-    mut hairs: Query<(Entity, &Strands, &mut LockNeighbours, Option<&SleepCounts>), HairHere>,
+    mut hairs: Query<
+        (Entity, &TickPose, &Strands, &mut LockNeighbours, Option<&SleepCounts>),
+        HairHere,
+    >,
     mut strands: ParamSet<(
-        Query<(&Strand, &StrandSleep), With<StrandOf>>,
+        Query<InContact, With<StrandOf>>,
         Query<(&mut Strand, &mut StrandSleep, &mut SleepPose), With<StrandOf>>,
     )>,
     mut faults: MessageWriter<HairFault>,
 ) {
-    let touching = hairs.iter_mut().filter_map(|(hair, members, neighbours, sleepers)| {
-        let contact = contact.of(hair);
-        let with_followers = neighbours.lists.has_extra_margin();
-        let all_rest = sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
-        // Of so few strands none is near another. Bridges of water are between all.
-        let simulated = sleepers.map_or(members.len(), |s| s.awake + s.asleep);
-        let is_sparse = !with_followers && simulated * SPARSE < members.len();
-        if contact.radius <= 0.0 || contact.strength <= 0.0 || all_rest || is_sparse {
-            return None;
-        }
-        let step = steps.of(hair)?;
-        Some(Touching { hair, members, neighbours, contact, step, fault: None })
-    });
+    let touching =
+        hairs.iter_mut().filter_map(|(hair, pose, members, mut neighbours, sleepers)| {
+            neighbours.bypass_change_detection().pairs.rest();
+            let contact = contact.of(hair);
+            let with_followers = neighbours.lists.has_extra_margin();
+            let all_rest =
+                sleepers.is_some_and(|s| s.awake == 0 && (s.asleep > 0 || !with_followers));
+            // Of so few strands none is near another. Bridges of water are between all.
+            let simulated = sleepers.map_or(members.len(), |s| s.awake + s.asleep);
+            let is_sparse = !with_followers && simulated * SPARSE < members.len();
+            if contact.radius <= 0.0 || contact.strength <= 0.0 || all_rest || is_sparse {
+                return None;
+            }
+            let step = steps.of(hair)?;
+            Some(Touching { hair, pose, members, neighbours, contact, step, fault: None })
+        });
     let mut touching: Vec<Touching> = touching.collect();
     let nodes: usize = touching.iter().map(|hair| hair.neighbours.nodes()).sum();
     let each = Nanos(CONTACT * nodes / touching.len().max(1));
@@ -365,14 +402,21 @@ pub(crate) fn push_strands_apart(
     let mut strands = strands.p1();
     for Touching { mut neighbours, contact, step, fault, .. } in touching {
         faults.write_batch(fault);
-        let StrandContact { radius, strength, .. } = contact;
-        let LockNeighbours { lists, members: (present, _), .. } =
+        let StrandContact { radius, strength, method, .. } = contact;
+        let LockNeighbours { lists, pairs, members: (present, _), .. } =
             neighbours.bypass_change_detection();
-        let mut pushes = lists.pushes();
+        let is_paired = method == ContactMethod::Pairs;
+        let mut pushes = match is_paired {
+            true => Either::Pairs(pairs.pushes(step.dt)),
+            false => Either::Lists(lists.pushes()),
+        };
         for some in present.chunks(TOGETHER) {
             strands.iter_many(some).for_each(|(strand, ..)| prefetch(strand.velocities()));
             let mut some = strands.iter_many_mut(some);
             while let Some((mut strand, mut sleep, mut still)) = some.fetch_next() {
+                if is_paired && sleep.is_follower() {
+                    continue;
+                }
                 if sleep.is_asleep() {
                     let pushes = pushes.by_ref().take(strand.nodes());
                     if still

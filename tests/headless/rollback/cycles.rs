@@ -21,6 +21,8 @@ enum Scene {
     /// A pillow is pressed on it.
     Bedhead,
     Gusts,
+    /// The same where contact is by pairs.
+    Pairs,
     BlowDry,
     /// Wound on a rod, treated, released.
     Perm,
@@ -41,6 +43,7 @@ impl Scene {
     const ALL: &[Self] = &[
         Self::Bedhead,
         Self::Gusts,
+        Self::Pairs,
         Self::BlowDry,
         Self::Perm,
         Self::Tied,
@@ -307,7 +310,8 @@ fn rain(world: &mut World, above: Vec3, rate: f32) {
 
 /// What the scene consists of: what moves, and the hairs that are rolled back.
 fn set(app: &mut App, scene: Scene) -> (Vec<(Entity, Transform)>, Vec<Entity>) {
-    app.insert_resource(HairDefault(StrandContact { radius: 4e-3, ..default() }));
+    let method = if scene == Scene::Pairs { ContactMethod::Pairs } else { ContactMethod::Printed };
+    app.insert_resource(HairDefault(StrandContact { radius: 4e-3, method, ..default() }));
     let gusts = HairWind { velocity: Vec3::new(3.0, 0.0, 1.0), gusts: 0.5, ..default() };
     #[cfg(all(feature = "groom", feature = "save"))]
     if scene == Scene::Worn {
@@ -328,7 +332,7 @@ fn set(app: &mut App, scene: Scene) -> (Vec<(Entity, Transform)>, Vec<Entity>) {
             let pillow = HairCollider::hull(&corners).unwrap();
             moved.push(world.spawn((pillow, Transform::from_xyz(0.0, 0.27, 0.0))).id());
         }
-        Scene::Gusts => world.insert_resource(gusts),
+        Scene::Gusts | Scene::Pairs => world.insert_resource(gusts),
         Scene::BlowDry => moved.push(world.spawn(Blower::default()).id()),
         Scene::Perm => {
             let across = Quat::from_rotation_z(core::f32::consts::FRAC_PI_2);

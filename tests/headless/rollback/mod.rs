@@ -15,6 +15,8 @@ const FAR: Vec3 = Vec3::new(50.0, 0.0, 0.0);
 enum Scene {
     Dry,
     Gusts,
+    /// The same where contact is by pairs.
+    Pairs,
     Wet,
 }
 
@@ -53,8 +55,9 @@ fn character_in(world: &mut World, scene: Scene, at: Vec3) -> Entity {
 }
 
 fn set_up(app: &mut App, scene: Scene) {
-    app.insert_resource(HairDefault(StrandContact { radius: 4e-3, ..default() }));
-    if scene == Scene::Gusts {
+    let method = if scene == Scene::Pairs { ContactMethod::Pairs } else { ContactMethod::Printed };
+    app.insert_resource(HairDefault(StrandContact { radius: 4e-3, method, ..default() }));
+    if matches!(scene, Scene::Gusts | Scene::Pairs) {
         let velocity = Vec3::new(3.0, 0.0, 1.0);
         app.insert_resource(HairWind { velocity, gusts: 0.5, ..default() });
     }
@@ -149,6 +152,11 @@ fn bits_of_dry_hair_hang_on_nothing_else_in_the_world() {
 #[test]
 fn bits_of_hair_in_gusts_hang_on_nothing_else_in_the_world() {
     hangs_on_nothing_else(Scene::Gusts);
+}
+
+#[test]
+fn bits_of_hair_whose_contact_is_by_pairs_hang_on_nothing_else_in_the_world() {
+    hangs_on_nothing_else(Scene::Pairs);
 }
 
 #[test]
