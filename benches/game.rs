@@ -113,7 +113,7 @@ fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
         }
         let state = if moving { "moving" } else { "at rest" };
         let all = [contact, pairs, soft, without];
-        let rows = in_turns(&mut app, |app, turn| {
+        let rows: [f64; 4] = in_turns(&mut app, |app, turn| {
             app.world_mut().entity_mut(hair).insert(all[turn]);
         });
         for (how, ms) in ["on", "by pairs", "pairs, no core", "off"].into_iter().zip(rows) {

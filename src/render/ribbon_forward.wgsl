@@ -36,7 +36,7 @@ struct ForwardVertex {
 
 struct Fragment {
     @location(0) color: vec4<f32>,
-    // Which way it lies on the screen, see `pass.rs`.
+    // Which way it lies on the screen, see `material.rs`.
     @location(1) mark: vec4<f32>,
 #ifdef HAIR_DEPTH
     @builtin(sample_mask) samples: u32,

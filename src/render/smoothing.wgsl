@@ -9,7 +9,7 @@ struct Smooth {
 }
 
 @group(0) @binding(0) var screen: texture_2d<f32>;
-// Of `pass.rs`.
+// As `material.rs` says.
 @group(0) @binding(1) var marks: texture_2d<f32>;
 @group(0) @binding(2) var<uniform> smooth_by: Smooth;
 

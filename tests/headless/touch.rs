@@ -67,7 +67,7 @@ fn look(strands: Query<&Strand>, mut seen: ResMut<Seen>) {
 fn driven(method: ContactMethod, speed: f32) -> (usize, f32) {
     let mut app = test_app(60.0);
     app.insert_resource(HairDefault(StrandContact { method, ..default() }));
-    app.insert_resource(HairDefault(AirDrag { rate: 0.0, ..default() }));
+    app.insert_resource(HairDefault(AirDrag { rate: 0.0 }));
     app.init_resource::<Seen>().add_systems(HairTick, look.in_set(HairSystems::Last));
     let mut random = Xoshiro256PlusPlus::seed_from_u64(4);
     let world = app.world_mut();

@@ -371,9 +371,10 @@ fn no_file_is_too_long_to_be_understood() {
 /// 48,850 before hats, several hairs of one wear, and hair that comes to its lengths where solids jam it,
 /// 49,480 before a hat held what grows under it, a character's own helmets hid hair, held hair gave way on the graphics card
 /// too, and what is done to hair in a pause stayed, 49,820 before reports of single hairs, grooms of drawn hair, strands of
-/// their own stiffness, groups by name, hair that keeps its hairdo on a changed groom, a pass of hair's own, and layers of drops.
+/// their own stiffness, groups by name, hair that keeps its hairdo on a changed groom, a pass of hair's own, and layers of drops, 51,210
+/// before contact by pairs of edges with friction and firm cores.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 51_210;
+const MOST_LINES: usize = 52_540;
 
 #[test]
 fn the_crate_stays_small() {

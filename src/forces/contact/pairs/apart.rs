@@ -6,17 +6,19 @@
 //! more than what there was by a twentieth of what lacks, so that strands that begin in each other part softly.
 
 use super::{
-    Pairs, PartPairs, Row,
     geometry::{Edge, gap, see},
     kick::BEARING,
-    nodes_of, overlaps,
-    search::{mean, place},
+    state::{Close, Pairs, PartPairs, Row, Scratch, mean, nodes_of, overlaps, place},
 };
 use crate::{
     base::lanes::V3,
     solver::rod::tridiagonal::{Elimination, back},
 };
 use glam::Vec3;
+
+/// Rounds of moving cores apart and restoring lengths in a substep, at most: strands that meet at 5 m/s take twenty,
+/// and most none.
+const ROUNDS: u32 = 24;
 
 /// Sweeps over all pairs before lengths are restored.
 const SWEEPS: usize = 4;
@@ -33,33 +35,6 @@ const TOLERANCE: f32 = 1e-3;
 /// The share of the cores' distance above which what is left of an overlap shows that it cannot be undone.
 const YIELDS: f32 = 0.05;
 
-/// A pair of edges that may come too near.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Close {
-    /// The part of its first edge, and its number there.
-    part: usize,
-    number: usize,
-    edges: [u32; 2],
-    normal: Vec3,
-    /// The gap along `normal` that has to be left (m), and that of cores.
-    least: f32,
-    core: f32,
-}
-
-/// Scratch space.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Scratch {
-    /// How far each node has moved (m).
-    moved: Vec<f32>,
-    close: Vec<Close>,
-    /// Nodes that are too near, by how much (m), and of which pair.
-    violated: Vec<([usize; 2], f32, usize)>,
-    /// How often each node is among them.
-    counts: Vec<f32>,
-    /// Whether each strand has been moved.
-    touched: Vec<bool>,
-}
-
 impl Pairs {
     /// Moves nodes at the `ends` of the step, each with its inverse mass (0 stays), until cores are apart. `lengths` has
     /// for each node that of the edge that starts there. What leaves another strand may enter a solid: `push_out` gives
@@ -68,7 +43,7 @@ impl Pairs {
         &mut self,
         ends: &mut [Row],
         lengths: &[f32],
-        (core, dt, rounds): (f32, f32, u32),
+        (core, dt): (f32, f32),
         push_out: impl Fn(usize, Vec3) -> Vec3,
     ) -> &[bool] {
         let Self { places, strands, parts, scratch, .. } = self;
@@ -89,7 +64,7 @@ impl Pairs {
         }
         counts.clear();
         counts.resize(ends.len(), 0.0);
-        for _ in 0..rounds {
+        for _ in 0..ROUNDS {
             let mut any = false;
             for _ in 0..SWEEPS {
                 violated.clear();
@@ -164,7 +139,9 @@ impl PartPairs {
         for (number, ((a, b), distance)) in pairs {
             let [a0, a1, b0, b1] = nodes_of([a, *b]);
             let way = f32::max(moved[a0], moved[a1]) + f32::max(moved[b0], moved[b1]);
-            if !(*distance <= core + way) || overlaps(&self.pasts[number]) {
+            // None is near one that is not a number.
+            let is_near = *distance <= core + way;
+            if !is_near || overlaps(&self.pasts[number]) {
                 continue;
             }
             let node = |n: usize| V3::new(places[n][0], places[n][1], places[n][2]);

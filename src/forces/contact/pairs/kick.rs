@@ -116,10 +116,10 @@ pub(super) fn kick<R: Real>(
     let parts = parts(seen.at);
     let mut split = zero;
     let mut whole = zero;
-    for k in 0..4 {
-        let light = parts[k] * parts[k] * moving.w[k];
+    for ((part, w), count) in parts.into_iter().zip(moving.w).zip(moving.counts) {
+        let light = part * part * w;
         whole = whole + light;
-        split = light.mul_add(moving.counts[k], split);
+        split = light.mul_add(count, split);
     }
     let is_held = whole.lt(dt.lit(1e-12));
     let split = R::select(is_held, one, split);

@@ -1,9 +1,11 @@
 //! Which edges are near each other: Verlet lists over a uniform grid.
 
-use super::{PART, PairContact, Pairs, PartPairs, Row, edge, stored};
+use super::{
+    geometry::see,
+    state::{Lists, PART, PairContact, Pairs, PartPairs, Row, edge, mean, place, stored},
+};
 use crate::{
     base::{
-        grid::UniformGrid,
         lanes::{dispatch, simd_level},
         parallel::{Nanos, for_each_block},
         tape::Tape,
@@ -41,21 +43,6 @@ const SLICED: Vec3 = Vec3::new(4.0, 1.0, 1.0);
 const MEASURE: usize = 3;
 const SEARCH: usize = 400;
 
-/// The state that lists were built from.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Lists {
-    grid: UniformGrid,
-    pieces: Vec<Pieces>,
-    unsorted: Vec<(Vec3, u32)>,
-    pub places: Vec<Row>,
-    strands: Vec<Range<u32>>,
-    reach: f32,
-    core: f32,
-    margin: f32,
-    /// The most pairs that an edge may have, the nearest.
-    most: usize,
-}
-
 /// Scratch space of a search.
 #[derive(Default)]
 struct Scratch {
@@ -63,17 +50,6 @@ struct Scratch {
     edges: Vec<u32>,
     /// Edges that are near, by their distance (m).
     near: Vec<(f32, u32)>,
-}
-
-pub(super) fn place(row: &Row) -> Vec3 {
-    Vec3::new(row[0], row[1], row[2])
-}
-
-/// The mean place of those that are finite.
-pub(super) fn mean(rows: &[Row]) -> Vec3 {
-    let finite = rows.iter().map(place).filter(|p| p.is_finite());
-    let (sum, count) = finite.fold((Vec3::ZERO, 0.0), |(sum, n), p| (sum + p, n + 1.0));
-    sum / f32::max(count, 1.0)
 }
 
 impl Lists {
@@ -220,7 +196,7 @@ impl Pairs {
 
 impl Pairs {
     /// What a substep finds of the one before: lists, as the places that they were built from, and what pairs remember.
-    pub(in super::super) fn record(&mut self, tape: &mut Tape<'_>) {
+    pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
         let mut places = core::mem::take(&mut self.lists.places);
         let mut ends: Vec<u32> = self.lists.strands.iter().map(|strand| strand.end).collect();
         let mut pasts: Vec<Row> = self.parts.iter().flat_map(|part| &part.pasts).copied().collect();
@@ -314,7 +290,7 @@ impl PartPairs {
                     b[..some.len()].copy_from_slice(some);
                     let ((edge_a, _), (edge_b, _)) =
                         (edge(simd, places, &[a; WIDTH]), edge(simd, places, &b));
-                    let distances = stored(super::see(edge_a, edge_b, reach).distance);
+                    let distances = stored(see(edge_a, edge_b, reach).distance);
                     let found = distances.into_iter().zip(some.iter().copied());
                     near.extend(found.filter(|(distance, _)| *distance < within));
                 }

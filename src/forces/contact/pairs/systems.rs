@@ -1,6 +1,6 @@
 //! Pairs in the tick: strands are collected and pushed before the solver's step, and kept apart after it.
 
-use super::{PairContact, PairNode, Pairs, Row};
+use super::state::{PairContact, PairNode, Pairs, Row};
 use crate::{
     base::{lanes::V3, schedule::EffectiveSubsteps, setting::Settings},
     forces::contact::{ContactMethod, LockNeighbours, Obstacles, StrandContact, coarse},
@@ -11,13 +11,9 @@ use crate::{
 };
 use bevy::{ecs::query::QueryData, prelude::*};
 
-/// Rounds of moving cores apart and restoring lengths in a substep, at most: strands that meet at 5 m/s take twenty,
-/// and most none.
-pub(super) const ROUNDS: u32 = 24;
-
 /// A strand, as contact sees it.
 #[derive(QueryData)]
-pub(in super::super) struct InContact {
+pub(crate) struct InContact {
     pub strand: &'static Strand,
     pub sleep: &'static StrandSleep,
     added: &'static AddedMass,
@@ -46,7 +42,7 @@ impl InContactItem<'_, '_> {
 }
 
 /// Evaluates the pairs of a hair's strands for a substep of `dt` (s).
-pub(in super::super) fn find<'s>(
+pub(crate) fn find<'s>(
     pairs: &mut Pairs,
     strands: impl Iterator<Item = InContactItem<'s, 's>>,
     contact: &StrandContact,
@@ -88,7 +84,7 @@ struct Apart<'a> {
     dt: f32,
 }
 
-pub(in super::super) fn keep_strands_apart(
+pub(crate) fn keep_strands_apart(
     steps: EffectiveSubsteps,
     contact: Settings<StrandContact>,
     mut hairs: Query<(Entity, &mut LockNeighbours, Option<&Obstacles>), HairHere>,
@@ -157,7 +153,7 @@ impl Apart<'_> {
         }
         let clearance = contact.radius;
         let push_out = |node: usize, place: Vec3| leave(obstacles, starts[node], place, clearance);
-        let touched = pairs.keep_apart(ends, lengths, (reach * contact.core, dt, ROUNDS), push_out);
+        let touched = pairs.keep_apart(ends, lengths, (reach * contact.core, dt), push_out);
         moved.extend(ids.iter().zip(touched).filter(|(_, touched)| **touched).map(|(id, _)| *id));
     }
 }

@@ -1,6 +1,12 @@
 //! Tests of lists and sums, against all pairs one by one.
 
-use super::{kick::parts, *};
+use super::{
+    geometry::{Edge, see},
+    kick::{Contact, Moving, Past, acts, kick, parts},
+    state::*,
+};
+use crate::base::lanes::V3;
+use glam::Vec3;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
 const CONTACT: PairContact = PairContact {

@@ -1,7 +1,7 @@
 //! Tests of strands that are driven at each other.
 
 use super::{
-    super::{PairContact, PairNode, systems::ROUNDS},
+    super::state::{PairContact, PairNode},
     *,
 };
 use glam::DVec3;
@@ -122,7 +122,7 @@ fn step(pairs: &mut Pairs, ropes: &mut [Rope], contact: PairContact, gravity: Ve
         }
         (0..4).for_each(|_| limit_lengths(&mut ends[own..], &lengths[own..]));
     }
-    pairs.keep_apart(&mut ends, &lengths, (contact.core, dt, ROUNDS), |_, p| p);
+    pairs.keep_apart(&mut ends, &lengths, (contact.core, dt), |_, p| p);
     let mut ends = ends.iter();
     for rope in ropes {
         for (p, v) in rope.places.iter_mut().zip(&mut rope.velocities) {
