@@ -69,7 +69,7 @@ impl Pairs {
             for _ in 0..SWEEPS {
                 violated.clear();
                 for (k, pair) in close.iter().enumerate() {
-                    if let Some((nodes, off)) = pair.violation(ends) {
+                    if let Some((nodes, off)) = pair.violation(ends, TOLERANCE * core) {
                         violated.push((nodes, off, k));
                         nodes.iter().for_each(|node| counts[*node] += 1.0);
                     }
@@ -113,7 +113,7 @@ impl Pairs {
         }
         if !violated.is_empty() {
             for pair in &*close {
-                if pair.violation(ends).is_some_and(|(_, off)| off > YIELDS * core) {
+                if pair.violation(ends, YIELDS * core).is_some() {
                     let bearing = &mut parts[pair.part].pasts[pair.number][3];
                     *bearing = -bearing.abs();
                 }
@@ -152,21 +152,22 @@ impl PartPairs {
             if now > 0.0 {
                 let least = core.min(now + RECOVERY * (core - now).max(0.0));
                 let normal = Vec3::new(normal.x, normal.y, normal.z);
-                close.push(Close { part, number, edges: [a, *b], normal, least, core });
+                close.push(Close { part, number, edges: [a, *b], normal, least });
             }
         }
     }
 }
 
 impl Close {
-    /// The nodes that lie farthest beyond each other, and by how much (m), unless neither can be moved.
-    fn violation(&self, ends: &[Row]) -> Option<([usize; 2], f32)> {
+    /// The nodes that lie farthest beyond each other, and by how much (m), where that is above `tolerance` and one of
+    /// them can be moved.
+    fn violation(&self, ends: &[Row], tolerance: f32) -> Option<([usize; 2], f32)> {
         let [a0, a1, b0, b1] = nodes_of(self.edges);
         let along = |node: usize| self.normal.dot(place(&ends[node]));
         let (low, i) = if along(a1) < along(a0) { (along(a1), a1) } else { (along(a0), a0) };
         let (high, j) = if along(b1) > along(b0) { (along(b1), b1) } else { (along(b0), b0) };
         let off = self.least - (low - high);
-        (off > TOLERANCE * self.core && ends[i][3] + ends[j][3] > 0.0).then_some(([i, j], off))
+        (off > tolerance && ends[i][3] + ends[j][3] > 0.0).then_some(([i, j], off))
     }
 }
 

@@ -22,8 +22,8 @@ pub(super) const BEARING: f64 = 0.2;
 const ANCHOR: f64 = 0.5;
 
 /// What contact is like. Masses are in metres of a dry strand.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Contact<R> {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Contact<R> {
     /// The distance of axes at which strands touch, 2r (m).
     pub reach: R,
     /// That at which their firm cores do (m).
@@ -36,6 +36,22 @@ pub(super) struct Contact<R> {
     pub cohesion: R,
     /// The substep (s).
     pub dt: R,
+}
+
+impl Contact<f32> {
+    /// The same in all lanes that `like` has.
+    #[inline(always)]
+    pub(super) fn splat<R: Real>(self, like: R) -> Contact<R> {
+        let lit = |value: f32| like.lit(value.into());
+        Contact {
+            reach: lit(self.reach),
+            core: lit(self.core),
+            strength: lit(self.strength),
+            friction: lit(self.friction),
+            cohesion: lit(self.cohesion),
+            dt: lit(self.dt),
+        }
+    }
 }
 
 /// The four nodes of two edges, a's first.

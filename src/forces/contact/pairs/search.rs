@@ -2,7 +2,8 @@
 
 use super::{
     geometry::see,
-    state::{Lists, PART, PairContact, Pairs, PartPairs, Row, edge, mean, place, stored},
+    kick::Contact,
+    state::{Lists, PART, Pairs, PartPairs, Row, edge, mean, place, stored},
 };
 use crate::{
     base::{
@@ -93,7 +94,7 @@ impl Lists {
 
 impl Pairs {
     /// Builds the lists again where they may miss a pair.
-    pub(super) fn look_up(&mut self, contact: &PairContact) {
+    pub(super) fn look_up(&mut self, contact: &Contact<f32>) {
         let Self { places, velocities, strands, lists, parts, .. } = self;
         let nodes = places.len() - 2;
         let is_other = lists.reach != contact.reach || lists.strands != *strands;

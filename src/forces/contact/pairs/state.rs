@@ -32,23 +32,6 @@ const GATHER: usize = 20;
 /// Three numbers of a node or of a pair, and one more.
 pub(super) type Row = [f32; 4];
 
-/// What contact between pairs is like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct PairContact {
-    /// The distance of axes at which strands touch (m).
-    pub(super) reach: f32,
-    /// That at which their firm cores do (m).
-    pub(super) core: f32,
-    /// The acceleration of strands whose axes coincide (m/s²).
-    pub(super) strength: f32,
-    /// Coulomb's coefficient of friction.
-    pub(super) friction: f32,
-    /// What holds strands that touch besides what presses them together (m/s²).
-    pub(super) cohesion: f32,
-    /// The substep (s).
-    pub(super) dt: f32,
-}
-
 /// A node of a strand.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PairNode {
@@ -153,9 +136,8 @@ pub(super) struct Close {
     pub(super) number: usize,
     pub(super) edges: [u32; 2],
     pub(super) normal: Vec3,
-    /// The gap along `normal` that has to be left (m), and that of cores.
+    /// The gap along `normal` that has to be left (m).
     pub(super) least: f32,
-    pub(super) core: f32,
 }
 
 /// Scratch space.
@@ -211,7 +193,7 @@ impl Pairs {
     }
 
     /// Evaluates all pairs, for [`kicks`](Self::kicks) to return. The order of summation does not depend on threads.
-    pub fn find(&mut self, contact: PairContact) {
+    pub fn find(&mut self, contact: Contact<f32>) {
         self.is_found = true;
         let nodes = self.strands.last().map_or(0, |strand| strand.end as usize);
         // Lanes without a pair have two edges that are not numbers.
@@ -315,7 +297,7 @@ pub(super) fn overlaps(past: &Row) -> bool {
 }
 
 /// 1 where a pair's cores may not touch, else 0.
-pub(super) fn is_firm(past: &Row, contact: &PairContact) -> f32 {
+pub(super) fn is_firm(past: &Row, contact: &Contact<f32>) -> f32 {
     if contact.core > 0.0 && !overlaps(past) { 1.0 } else { 0.0 }
 }
 
@@ -356,29 +338,20 @@ pub(super) fn edge<S: Simd>(
     (Edge { start, end }, [at_start, at_end])
 }
 
-impl<R: Real> Contact<R> {
-    #[inline(always)]
-    pub(super) fn of(contact: &PairContact, like: R) -> Self {
-        let lit = |value: f32| like.lit(value.into());
-        Self {
-            reach: lit(contact.reach),
-            core: lit(contact.core),
-            strength: lit(contact.strength),
-            friction: lit(contact.friction),
-            cohesion: lit(contact.cohesion),
-            dt: lit(contact.dt),
-        }
-    }
-}
-
 impl PartPairs {
     /// Finds the pairs that act.
     #[inline(always)]
-    fn see<S: Simd>(&mut self, simd: S, places: &[Row], velocities: &[Row], contact: &PairContact) {
+    fn see<S: Simd>(
+        &mut self,
+        simd: S,
+        places: &[Row],
+        velocities: &[Row],
+        contact: &Contact<f32>,
+    ) {
         let nowhere = places.len() as u32 - 2;
         self.active.clear();
         self.distances.clear();
-        let lanes = Contact::of(contact, f32x8::splat(simd, 0.0));
+        let lanes = contact.splat(f32x8::splat(simd, 0.0));
         let edges = (self.first..).zip(self.starts.windows(2));
         let mut firsts = edges.flat_map(|(edge, w)| (w[0]..w[1]).map(move |_| edge));
         for (k, seconds) in self.seconds.chunks(WIDTH).enumerate() {
@@ -426,10 +399,10 @@ impl PartPairs {
         simd: S,
         places: &[Row],
         velocities: &[Row],
-        contact: &PairContact,
+        contact: &Contact<f32>,
     ) {
         let one = f32x8::splat(simd, 1.0);
-        let lanes = Contact::of(contact, one);
+        let lanes = contact.splat(one);
         self.impulses.clear();
         self.impulses.resize(self.seconds.len(), Impulse::default());
         // What does not act any more has no past.

@@ -1,6 +1,9 @@
 //! Pairs in the tick: strands are collected and pushed before the solver's step, and kept apart after it.
 
-use super::state::{PairContact, PairNode, Pairs, Row};
+use super::{
+    kick::Contact,
+    state::{PairNode, Pairs, Row},
+};
 use crate::{
     base::{lanes::V3, schedule::EffectiveSubsteps, setting::Settings},
     forces::contact::{ContactMethod, LockNeighbours, Obstacles, StrandContact, coarse},
@@ -65,7 +68,7 @@ pub(crate) fn find<'s>(
         };
         pairs.add(places, stride, (0..places.len()).map(node));
     }
-    pairs.find(PairContact {
+    pairs.find(Contact {
         reach,
         core: reach * contact.core,
         strength: contact.strength,

@@ -9,7 +9,7 @@ use crate::base::lanes::V3;
 use glam::Vec3;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
-const CONTACT: PairContact = PairContact {
+const CONTACT: Contact<f32> = Contact {
     reach: 2e-3,
     core: 7e-4,
     strength: 20.0,
@@ -66,7 +66,7 @@ fn brute(
         edges.extend((0..strand.len() - 1).map(|k| (s, start + k)));
         start += strand.len();
     }
-    let contact = Contact::of(&CONTACT, 0.0f64);
+    let contact = CONTACT.splat(0.0f64);
     let mut acting = Vec::new();
     for (k, (s, a)) in edges.iter().enumerate() {
         for (other, b) in &edges[k + 1..] {
@@ -190,7 +190,7 @@ fn what_a_strand_in_a_bed_feels_does_not_depend_on_its_segments() {
             let mut pairs = Pairs::default();
             add_all(&mut pairs, &strands);
             // So short a step that nothing gives way.
-            pairs.find(PairContact { dt: 1e-5, ..CONTACT });
+            pairs.find(Contact { dt: 1e-5, ..CONTACT });
             let last = strands.last().unwrap();
             let kicks = &pairs.kicks[25 * (n + 1)..];
             kicks.iter().zip(last).map(|(kick, node)| *kick * node.mass / 1e-5).sum::<Vec3>().z
