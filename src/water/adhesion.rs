@@ -8,7 +8,9 @@ use super::{
     strand_block::{NodeSlice, StrandBlock, StrandLane},
 };
 use crate::base::grid::FoundBalls;
-use crate::base::lanes::{LANES, Lane, Real, V3, dispatch, lanes_in, load, load3, splat3, store3};
+use crate::base::lanes::{
+    LANES, Lane, Real, V3, dispatch, inlined, lanes_in, load, load3, splat3, store3,
+};
 use bevy::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -225,7 +227,10 @@ impl ContactParams<'_> {
         let weight = f32x16::splat(simd, LIFT * self.gravity.length() * self.dt);
         let excess = weight / Real::max(lift, weight) - 1.0;
         let excess = Real::select(Real::lt(weight, lift), excess, f32x16::splat(simd, 0.0));
-        let limited = |change: V3<f32x16<S>>| up.scale_add(change.dot(up) * excess, change);
+        let limited = inlined(
+            #[inline(always)]
+            |change: V3<f32x16<S>>| up.scale_add(change.dot(up) * excess, change),
+        );
         let mut v = limited(change).scale_add(share / inertia, load3(simd, &row.v));
         let mass = load(simd, &row.mass);
         // Roots are fixed and exert no reaction on droplets.

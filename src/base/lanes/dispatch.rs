@@ -46,6 +46,15 @@ macro_rules! with_token {
 
 pub(crate) use {dispatch, with_token};
 
+/// Hands a closure through that is `#[inline(always)]`, which a `let` alone does not take.
+///
+/// Closures that a kernel calls have to be: one that the compiler leaves as a function is compiled without the kernel's
+/// instruction set, and each of its operations becomes a call.
+#[inline(always)]
+pub(crate) const fn inlined<F>(closure: F) -> F {
+    closure
+}
+
 /// The instruction set that kernels run on: the machine's best, or the one that the environment variable
 /// `KERATIN_SIMD` names, read once. AVX2 and AVX-512 give the same bits. SSE2 rounds products before
 /// they are added, which the others fuse.

@@ -37,7 +37,10 @@ pub(crate) fn choose_near<S: Simd>(
     if obstacles.is_empty() {
         balls.clear();
     } else {
-        let whole = ball_around(simd, b);
+        let whole = simd.vectorize(
+            #[inline(always)]
+            || ball_around(simd, b),
+        );
         ObstacleBalls::collect(&mut balls, obstacles.iter().enumerate(), whole);
     }
     b.obstacle_balls = balls;

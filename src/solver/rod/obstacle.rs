@@ -1,7 +1,7 @@
 //! Obstacles of rods in lanes: half-spaces, capsules, cylinders and placed shapes.
 
 use super::shape::Placed;
-use crate::base::lanes::{LANES, Lane, Real, V3, load, load3, splat};
+use crate::base::lanes::{LANES, Lane, Real, V3, inlined, load, load3, splat};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 use glam::{Affine3A, BVec3, Vec3};
 
@@ -365,10 +365,13 @@ pub(super) fn continuous_collision<S: Simd>(
     let (facing, depth) = obstacle.solid.depth(start, clearance);
     let mut deepest = lit(f32::NEG_INFINITY);
     let mut leaving = facing;
-    let across = |v: V3<f32x16<S>>| {
-        let u = splat(v.x, axis);
-        u.scale_add(-v.dot(u), v)
-    };
+    let across = inlined(
+        #[inline(always)]
+        |v: V3<f32x16<S>>| {
+            let u = splat(v.x, axis);
+            u.scale_add(-v.dot(u), v)
+        },
+    );
     let (from, along) = (across(start - splat(p.x, center)), across(way));
     let nearest = -from.dot(along) / Real::max(along.dot(along), lit(1e-20));
     let nearest = match &obstacle.solid {

@@ -5,7 +5,7 @@ use super::{
     near::ESCAPE_RATIO,
     obstacle::{NearObstacles, Obstacle, Push, continuous_collision, push_out},
 };
-use crate::base::lanes::{LANES, Real, V3, load, load3, store3};
+use crate::base::lanes::{LANES, Real, V3, inlined, load, load3, store3};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 
 /// Computes for each node how deep it may be in obstacles: nearer to a root that lies in one than that is deep, it
@@ -148,7 +148,10 @@ pub(crate) fn predict_nodes<S: Simd>(
                 let mut from = p;
                 for o in near.of(obstacles) {
                     let start = o.moved_with(from);
-                    let allowed = limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
+                    let allowed = match &limit {
+                        Some(limit) => limit.allowed(o, clearance, from),
+                        None => zero,
+                    };
                     if let Some(push) = push_out(o, start, clearance, allowed) {
                         from = V3::select(held, from, from + (push.to - start));
                     }
@@ -159,18 +162,22 @@ pub(crate) fn predict_nodes<S: Simd>(
                 let start_position = V3::select(held, load3(simd, &n.from), from);
                 store3(&mut n.from, start_position);
                 let mut to = v.scale_add(dt, from);
-                let farthest = |to: V3<f32x16<S>>| {
-                    pushed.map_or(to, |time| {
+                let farthest = inlined(
+                    #[inline(always)]
+                    |to: V3<f32x16<S>>| {
+                        let Some(time) = pushed else { return to };
                         let push = load3(simd, &n.push).scale_add(time, load3(simd, &n.kick));
                         push.scale_add(dt, to)
-                    })
-                };
+                    },
+                );
                 for o in near.of(obstacles) {
                     if let Some((before, normal)) =
                         continuous_collision(o, o.moved_with(from), farthest(to), clearance)
                     {
-                        let allowed =
-                            limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
+                        let allowed = match &limit {
+                            Some(limit) => limit.allowed(o, clearance, from),
+                            None => zero,
+                        };
                         let stopped = Real::lt(zero, normal.dot(normal));
                         let stopped = stopped & !(held | Real::lt(zero, allowed));
                         (to, b.has_fast_nodes) = (V3::select(stopped, before, to), true);
@@ -309,7 +316,10 @@ pub(super) fn touch<S: Simd>(
             let bearing = rested.dot(friction.reaction);
             let mut deepest = f32x16::splat(simd, -1.0);
             for o in near.of(obstacles) {
-                let allowed = limit.as_ref().map_or(zero, |l| l.allowed(o, clearance, from));
+                let allowed = match &limit {
+                    Some(limit) => limit.allowed(o, clearance, from),
+                    None => zero,
+                };
                 // Tunnelling has to be stopped in every pass: the shortest way out may be on the wrong
                 // side.
                 if has_fast_nodes

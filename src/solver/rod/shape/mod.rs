@@ -7,7 +7,7 @@ mod hull;
 
 pub use {grid::DistanceGrid, hull::ConvexHull};
 
-use crate::base::lanes::{Real, V3, splat};
+use crate::base::lanes::{Real, V3, inlined, splat};
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*};
 use glam::{Mat3, Vec3};
 
@@ -148,10 +148,13 @@ impl Shape {
             }
             Self::Hull(hull) => middle_within(start, way, hull.planes()),
             Self::Ellipsoid { radii } | Self::Hat { radii, holds: false, .. } => {
-                let squeezed = |v: V3<R>| {
-                    let inverse = radii.recip();
-                    V3::new(v.x * lit(inverse.x), v.y * lit(inverse.y), v.z * lit(inverse.z))
-                };
+                let squeezed = inlined(
+                    #[inline(always)]
+                    |v: V3<R>| {
+                        let inverse = radii.recip();
+                        V3::new(v.x * lit(inverse.x), v.y * lit(inverse.y), v.z * lit(inverse.z))
+                    },
+                );
                 let (from, along) = (squeezed(start), squeezed(way));
                 let t = -from.dot(along) / along.dot(along).max(lit(1e-20));
                 t.max(zero).min(one)
@@ -265,11 +268,14 @@ fn ellipsoid<R: Real>(p: V3<R>, radii: Vec3) -> (V3<R>, R) {
     let a = V3::new(y.x * lit(r.x), y.y * lit(r.y), y.z * lit(r.z));
     let mut s = (a.x - e.x).max(a.y - e.y).max(a.z - e.z);
     for _ in 0..newton_steps(1.0 / least) {
-        let over = |a: R, e: R| {
-            let inverse = a.lit(1.0) / (s + e);
-            let share = a * inverse;
-            (share * share, share * share * inverse)
-        };
+        let over = inlined(
+            #[inline(always)]
+            |a: R, e: R| {
+                let inverse = a.lit(1.0) / (s + e);
+                let share = a * inverse;
+                (share * share, share * share * inverse)
+            },
+        );
         let [x, y, z] = [over(a.x, e.x), over(a.y, e.y), over(a.z, e.z)];
         let (g, slope) = (x.0 + y.0 + z.0, x.1 + y.1 + z.1);
         s = s + (g * g.sqrt() - g) / slope;
