@@ -99,24 +99,29 @@ fn rows(threads: usize) {
 
 fn preset_rows(name: &str, preset: HairPreset, threads: usize) {
     let strands = plant(preset);
-    let mut app = app(threads);
-    let hair = person(&mut app, preset, &strands, Vec3::ZERO);
     let contact = preset.settings().contact;
     let without = StrandContact { strength: 0.0, ..contact };
     let pairs = StrandContact { method: ContactMethod::Pairs, ..contact };
     let soft = StrandContact { core: 0.0, ..pairs };
-    settle(&mut app);
+    // Each has come to rest with its own contact.
+    let hows = [("on", contact), ("by pairs", pairs), ("pairs, no core", soft), ("off", without)];
+    let mut hairs = [Entity::PLACEHOLDER; 4];
+    let mut apps = [0, 1, 2, 3].map(|k| {
+        let mut app = app(threads);
+        hairs[k] = person(&mut app, preset, &strands, Vec3::ZERO);
+        app.world_mut().entity_mut(hairs[k]).insert(hows[k].1);
+        settle(&mut app);
+        app
+    });
     for moving in [false, true] {
         if moving {
-            app.world_mut().entity_mut(hair).insert(Walks { phase: 0.0 });
-            settle(&mut app);
+            for (app, hair) in apps.iter_mut().zip(hairs) {
+                app.world_mut().entity_mut(hair).insert(Walks { phase: 0.0 });
+                settle(app);
+            }
         }
         let state = if moving { "moving" } else { "at rest" };
-        let all = [contact, pairs, soft, without];
-        let rows: [f64; 4] = in_turns(&mut app, |app, turn| {
-            app.world_mut().entity_mut(hair).insert(all[turn]);
-        });
-        for (how, ms) in ["on", "by pairs", "pairs, no core", "off"].into_iter().zip(rows) {
+        for ((how, _), ms) in hows.iter().zip(wet::apps_in_turns(&mut apps)) {
             println!("{name} {state} | {threads} | {how} | {ms:.2}");
         }
     }

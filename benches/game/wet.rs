@@ -45,7 +45,7 @@ pub fn rows(name: &str, preset: HairPreset, threads: usize) {
         (0..(seconds * 60.0) as u32).for_each(|_| app.update());
         app
     });
-    let times = in_turns(&mut apps);
+    let times = apps_in_turns(&mut apps);
     for ((app, (_, state)), ms) in apps.iter_mut().zip(STATES).zip(times) {
         println!("{name}, {state} | {threads} | on | {ms:.2} | {:.2} of dry", ms / times[0]);
         if std::env::var_os(PARTS).is_some() {
@@ -87,7 +87,7 @@ pub fn crowd(threads: usize) {
         settle(&mut app);
         app
     });
-    let [dry, wet] = in_turns(&mut apps);
+    let [dry, wet] = apps_in_turns(&mut apps);
     println!("2 near + 20 background, dry | {threads} | on | {dry:.2}");
     println!("2 near in rain + 20 | {threads} | on | {wet:.2} | {:.2} of dry", wet / dry);
 }
@@ -136,7 +136,7 @@ fn emerging(preset: HairPreset, strands: &[Strand], threads: usize) -> Vec<f64> 
 }
 
 /// Medians of interleaved runs of several apps (ms a tick).
-fn in_turns<const N: usize>(apps: &mut [App; N]) -> [f64; N] {
+pub fn apps_in_turns<const N: usize>(apps: &mut [App; N]) -> [f64; N] {
     let mut runs = [[0.0; RUNS]; N];
     for run in 0..RUNS {
         for (app, runs) in apps.iter_mut().zip(&mut runs) {

@@ -374,7 +374,7 @@ fn no_file_is_too_long_to_be_understood() {
 /// their own stiffness, groups by name, hair that keeps its hairdo on a changed groom, a pass of hair's own, and layers of drops, 51,210
 /// before contact by pairs of edges with friction and firm cores.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 52_540;
+const MOST_LINES: usize = 52_790;
 
 #[test]
 fn the_crate_stays_small() {

@@ -6,19 +6,24 @@
 //! more than what there was by a twentieth of what lacks, so that strands that begin in each other part softly.
 
 use super::{
-    geometry::{Edge, gap, see},
-    kick::BEARING,
-    state::{Close, Pairs, PartPairs, Row, Scratch, mean, nodes_of, overlaps, place},
+    geometry::{Edge, Row, gap, place, see},
+    kick::{BEARING, Contact},
+    state::{Close, Kept, Memory, Near, Pairs, PartPairs, Scratch, measure, nodes_of, overlaps},
 };
 use crate::{
-    base::lanes::V3,
+    base::lanes::{V3, dispatch, simd_level},
     solver::rod::tridiagonal::{Elimination, back},
 };
 use glam::Vec3;
 
 /// Rounds of moving cores apart and restoring lengths in a substep, at most: strands that meet at 5 m/s take twenty,
-/// and most none.
-const ROUNDS: u32 = 24;
+/// those that meet at 8 m/s thirty, and most none.
+const ROUNDS: u32 = 48;
+
+/// So many rounds that have not left less than this share of the worst overlap show that it cannot be undone: single
+/// rounds on the way to the end may leave more than they found.
+const STALLED: u32 = 6;
+const GETS_ON: f32 = 0.8;
 
 /// Sweeps over all pairs before lengths are restored.
 const SWEEPS: usize = 4;
@@ -32,8 +37,9 @@ const RECOVERY: f32 = 0.05;
 /// The share of the cores' distance by which they may overlap.
 const TOLERANCE: f32 = 1e-3;
 
-/// The share of the cores' distance above which what is left of an overlap shows that it cannot be undone.
-const YIELDS: f32 = 0.05;
+/// The share of the cores' distance that a substep may leave of an overlap: the next one goes on, so that what bears a
+/// load rests where a round undoes what the load does in a substep.
+const LEFT: f32 = 0.1;
 
 impl Pairs {
     /// Moves nodes at the `ends` of the step, each with its inverse mass (0 stays), until cores are apart. `lengths` has
@@ -43,43 +49,56 @@ impl Pairs {
         &mut self,
         ends: &mut [Row],
         lengths: &[f32],
-        (core, dt): (f32, f32),
+        contact: &Contact<f32>,
         push_out: impl Fn(usize, Vec3) -> Vec3,
     ) -> &[bool] {
-        let Self { places, strands, parts, scratch, .. } = self;
-        let Scratch { moved, close, violated, counts, touched } = scratch;
+        let Self { places, strands, lists, moved, parts, scratch, .. } = self;
+        let Scratch { close, violated, counts, touched } = scratch;
         touched.clear();
         touched.resize(strands.len(), false);
         if ends.len() + 2 != places.len() || lengths.len() != ends.len() {
             return touched;
         }
-        let drift = mean(ends) - mean(&places[..ends.len()]);
-        moved.clear();
-        moved.extend(
-            ends.iter().zip(&*places).map(|(to, from)| (place(to) - place(from) - drift).length()),
-        );
+        let Contact { core, dt, .. } = *contact;
+        // Forces of the substep may have moved nodes elsewhere than their velocities before it.
+        let way = |node: usize| place(&ends[node]) - place(&places[node]);
+        lists.look_up(parts, places, strands, contact, way);
+        let way = |node: usize| place(&places[node]) - place(&lists.places[node]);
+        measure(&mut moved[0], ends.len(), way);
+        measure(&mut moved[1], ends.len(), |node| place(&ends[node]) - place(&lists.places[node]));
+        let level = simd_level();
         close.clear();
-        for (number, part) in parts.iter().enumerate() {
-            part.find_close(number, places, moved, core, close);
+        for (number, part) in parts.iter_mut().enumerate() {
+            dispatch!(level, simd => part.sift(simd, moved, [core, core]));
+            part.find_close(number, places, core, close);
         }
         counts.clear();
         counts.resize(ends.len(), 0.0);
-        for _ in 0..ROUNDS {
-            let mut any = false;
-            for _ in 0..SWEEPS {
+        let (mut is_apart, mut is_stalled) = (false, false);
+        // The least that rounds have left, and after which.
+        let (mut least, mut after) = (f32::INFINITY, 0);
+        for round in 0..ROUNDS {
+            for sweep in 0..SWEEPS {
                 violated.clear();
+                let mut worst = 0.0f32;
                 for (k, pair) in close.iter().enumerate() {
                     if let Some((nodes, off)) = pair.violation(ends, TOLERANCE * core) {
                         violated.push((nodes, off, k));
                         nodes.iter().for_each(|node| counts[*node] += 1.0);
+                        worst = worst.max(off);
                     }
                 }
-                if violated.is_empty() {
+                let enough = if round == 0 { TOLERANCE } else { LEFT };
+                is_apart = sweep == 0 && worst <= enough * core;
+                if sweep == 0 && worst < GETS_ON * least {
+                    (least, after) = (worst, round);
+                }
+                is_stalled = sweep == 0 && round - after >= STALLED;
+                if is_apart || is_stalled || violated.is_empty() {
                     break;
                 }
-                any = true;
                 for ([i, j], off, k) in &*violated {
-                    let Close { part, number, normal, .. } = close[*k];
+                    let normal = close[*k].normal;
                     let (wi, wj) = (ends[*i][3], ends[*j][3]);
                     let apart = off / (wi * counts[*i] + wj * counts[*j]);
                     for (node, by) in [(*i, apart * wi), (*j, -apart * wj)] {
@@ -89,13 +108,13 @@ impl Pairs {
                             touched[strands.partition_point(|s| s.end as usize <= node)] = true;
                         }
                     }
-                    parts[part].pasts[number][3] += BEARING as f32 * apart / dt;
+                    close[*k].borne += BEARING as f32 * apart / dt;
                 }
                 for (nodes, ..) in &*violated {
                     nodes.iter().for_each(|node| counts[*node] = 0.0);
                 }
             }
-            if !any {
+            if is_apart || is_stalled {
                 break;
             }
             for (strand, _) in strands.iter().zip(&*touched).filter(|(_, touched)| **touched) {
@@ -111,39 +130,27 @@ impl Pairs {
                 }
             }
         }
-        if !violated.is_empty() {
-            for pair in &*close {
-                if pair.violation(ends, YIELDS * core).is_some() {
-                    let bearing = &mut parts[pair.part].pasts[pair.number][3];
-                    *bearing = -bearing.abs();
-                }
+        if !is_apart {
+            for pair in &mut *close {
+                pair.gives_way = pair.violation(ends, LEFT * core).is_some();
             }
+        }
+        for own in close.chunk_by(|a, b| a.part == b.part) {
+            parts[own[0].part].remember(own);
         }
         touched
     }
 }
 
 impl PartPairs {
-    /// Adds the pairs whose cores may touch, for all that nodes have moved.
-    fn find_close(
-        &self,
-        part: usize,
-        places: &[Row],
-        moved: &[f32],
-        core: f32,
-        close: &mut Vec<Close>,
-    ) {
-        let edges = (self.first..).zip(self.starts.windows(2));
-        let firsts = edges.flat_map(|(edge, w)| (w[0]..w[1]).map(move |_| edge));
-        let pairs = firsts.zip(&self.seconds).zip(&self.distances).enumerate();
-        for (number, ((a, b), distance)) in pairs {
-            let [a0, a1, b0, b1] = nodes_of([a, *b]);
-            let way = f32::max(moved[a0], moved[a1]) + f32::max(moved[b0], moved[b1]);
-            // None is near one that is not a number.
-            let is_near = *distance <= core + way;
-            if !is_near || overlaps(&self.pasts[number]) {
+    /// Adds those of the pairs that may be near whose cores are kept apart.
+    fn find_close(&self, part: usize, places: &[Row], core: f32, close: &mut Vec<Close>) {
+        let mut memory = Memory(&self.kept);
+        for Near { number, edges } in &self.near {
+            if memory.of(*number).is_some_and(|past| overlaps(&past)) {
                 continue;
             }
+            let [a0, a1, b0, b1] = nodes_of(*edges);
             let node = |n: usize| V3::new(places[n][0], places[n][1], places[n][2]);
             let edge = |from: usize, to: usize| Edge { start: node(from), end: node(to) };
             let (first, second) = (edge(a0, a1), edge(b0, b1));
@@ -152,9 +159,34 @@ impl PartPairs {
             if now > 0.0 {
                 let least = core.min(now + RECOVERY * (core - now).max(0.0));
                 let normal = Vec3::new(normal.x, normal.y, normal.z);
-                close.push(Close { part, number, edges: [a, *b], normal, least });
+                let (number, edges) = (*number, *edges);
+                let (borne, gives_way) = (0.0, false);
+                close.push(Close { part, number, edges, normal, least, borne, gives_way });
             }
         }
+    }
+
+    /// Keeps what pairs have borne, and which have given way.
+    fn remember(&mut self, close: &[Close]) {
+        let changes = || close.iter().filter(|pair| pair.borne != 0.0 || pair.gives_way);
+        if changes().next().is_none() {
+            return;
+        }
+        core::mem::swap(&mut self.kept, &mut self.before.2);
+        self.kept.clear();
+        let mut others = self.before.2.iter().peekable();
+        for Close { number, borne, gives_way, .. } in changes() {
+            let before = |kept: &&Kept| kept.number < *number;
+            self.kept.extend(core::iter::from_fn(|| others.next_if(before)));
+            let own = others.next_if(|kept| kept.number == *number);
+            let mut past = own.map_or([0.0; 4], |kept| kept.past);
+            past[3] += borne;
+            if *gives_way {
+                past[3] = -past[3].abs();
+            }
+            self.kept.push(Kept { number: *number, past });
+        }
+        self.kept.extend(others);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Two edges as seen by each other: nearest points, and where and along how much of them they touch.
 
-use crate::base::lanes::{Real, V3};
+use crate::base::lanes::{Real, V3, inlined};
+use glam::Vec3;
 
 /// Squared lengths below this (m²) are those of points.
 const POINT: f64 = 1e-20;
@@ -12,6 +13,13 @@ const NEARLY_PARALLEL: f64 = 1e-5;
 /// Places in an interval of length 1 around 0, and their weights, by which polynomials of degree 5 are integrated.
 const GAUSS: [(f64, f64); 3] =
     [(-0.387_298_334_6, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.387_298_334_6, 5.0 / 18.0)];
+
+/// Three numbers of a node or of a pair, and one more.
+pub(super) type Row = [f32; 4];
+
+pub(super) fn place(row: &Row) -> Vec3 {
+    Vec3::new(row[0], row[1], row[2])
+}
 
 /// An edge between two nodes.
 #[derive(Clone, Copy, Debug)]
@@ -68,17 +76,20 @@ pub(super) fn see<R: Real>(a: Edge<R>, b: Edge<R>, reach: R) -> Seen<R> {
     // The nearest points are those of the lines where both lie on the edges, else one of them is an end.
     let mut nearest = (r, zero, zero);
     let mut least = reach.lit(f64::from(f32::MAX));
-    let mut try_at = |s: R, t: R| {
-        let off = a.point(s) - b.point(t);
-        let squared = off.dot(off);
-        let is_less = squared.lt(least);
-        nearest = (
-            V3::select(is_less, off, nearest.0),
-            R::select(is_less, s, nearest.1),
-            R::select(is_less, t, nearest.2),
-        );
-        least = squared.min(least);
-    };
+    let mut try_at = inlined(
+        #[inline(always)]
+        |s: R, t: R| {
+            let off = a.point(s) - b.point(t);
+            let squared = off.dot(off);
+            let is_less = squared.lt(least);
+            nearest = (
+                V3::select(is_less, off, nearest.0),
+                R::select(is_less, s, nearest.1),
+                R::select(is_less, t, nearest.2),
+            );
+            least = squared.min(least);
+        },
+    );
     try_at(zero, clamp(br / bb, zero, one));
     try_at(one, clamp((br + ab) / bb, zero, one));
     try_at(clamp(-ar / aa, zero, one), zero);
@@ -104,29 +115,32 @@ pub(super) fn see<R: Real>(a: Edge<R>, b: Edge<R>, reach: R) -> Seen<R> {
     let none = V3::new(zero, zero, zero);
     let (mut overlap, mut length) = (none, zero);
     let (mut deep, mut shift_a, mut shift_b) = (zero, zero, zero);
-    let mut add = |low: R, high: R, share: R, way: R| {
-        let spread = reach.lit(2.0) * share.max(reach.lit(1e-12)).sqrt();
-        let share = one - share;
-        let farthest = within / spread;
-        let low = low.max(-on_a).max(-farthest);
-        let high = high.min(la - on_a).min(farthest);
-        let width = (high - low).max(zero);
-        let middle = half * (low + high);
-        for (place, weight) in GAUSS {
-            let u = width.mul_add(reach.lit(place), middle);
-            let s = clamp((on_a + u) / la, zero, one);
-            let t = clamp((on_b + u * way) / lb, zero, one);
-            let off = a.point(s) - b.point(t);
-            let apart = off.dot(off).max(reach.lit(1e-24)).sqrt();
-            let weight = reach.lit(weight) * share * width;
-            let own = (reach - apart).max(zero) * weight;
-            overlap = off.scale_add(own / apart, overlap);
-            length = length + R::select(zero.lt(own), weight, zero);
-            deep = deep + own;
-            shift_a = shift_a + own * s;
-            shift_b = shift_b + own * t;
-        }
-    };
+    let mut add = inlined(
+        #[inline(always)]
+        |low: R, high: R, share: R, way: R| {
+            let spread = reach.lit(2.0) * share.max(reach.lit(1e-12)).sqrt();
+            let share = one - share;
+            let farthest = within / spread;
+            let low = low.max(-on_a).max(-farthest);
+            let high = high.min(la - on_a).min(farthest);
+            let width = (high - low).max(zero);
+            let middle = half * (low + high);
+            for (place, weight) in GAUSS {
+                let u = width.mul_add(reach.lit(place), middle);
+                let s = clamp((on_a + u) / la, zero, one);
+                let t = clamp((on_b + u * way) / lb, zero, one);
+                let off = a.point(s) - b.point(t);
+                let apart = off.dot(off).max(reach.lit(1e-24)).sqrt();
+                let weight = reach.lit(weight) * share * width;
+                let own = (reach - apart).max(zero) * weight;
+                overlap = off.scale_add(own / apart, overlap);
+                length = length + R::select(zero.lt(own), weight, zero);
+                deep = deep + own;
+                shift_a = shift_a + own * s;
+                shift_b = shift_b + own * t;
+            }
+        },
+    );
     // For a u the points of edges at an angle θ that run the same way are 2u sin(θ/2) apart.
     add(-on_b, lb - on_b, half * (one - cosine), one);
     add(on_b - lb, on_b, half * (one + cosine), -one);

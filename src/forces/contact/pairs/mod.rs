@@ -10,12 +10,14 @@
 //! | `geometry` | two edges as seen by each other |
 //! | `kick` | the impulse between them |
 //! | `search` | which pairs there are |
+//! | `regions` | how much nearer they may have come since |
 //! | `apart` | what keeps firm cores apart after the solver's step |
 //! | `systems` | the same in the tick |
 
 mod apart;
 mod geometry;
 mod kick;
+mod regions;
 mod search;
 mod state;
 mod systems;

@@ -1,9 +1,10 @@
 //! Which edges are near each other: Verlet lists over a uniform grid.
 
 use super::{
-    geometry::see,
+    geometry::{Row, place, see},
     kick::Contact,
-    state::{Lists, PART, Pairs, PartPairs, Row, edge, mean, place, stored},
+    regions::Extent,
+    state::{Kept, Lists, Memory, PART, Pairs, PartPairs, edge, stored},
 };
 use crate::{
     base::{
@@ -17,155 +18,182 @@ use core::ops::Range;
 use fearless_simd::{Simd, f32x8, prelude::*};
 use glam::Vec3;
 
-/// Margin of the lists, in units of the reach.
-const MARGIN: f32 = 1.0;
+/// The least and the most that lists hold beyond the reach, in units of it.
+const MARGINS: [f32; 2] = [1.0, 24.0];
 
-/// The most that they may have, for hair whose strands meet fast.
-const MOST_MARGIN: f32 = 24.0;
+/// How many substeps lists are to last, where they hold no more pairs an edge by that.
+const LASTS: f32 = 6.0;
+const MOST_PAIRS: f32 = 16.0;
 
-/// A margin beyond [`MARGIN`] is taken where lists hold about so many pairs an edge by it, at most.
-const MOST_PAIRS: f32 = 32.0;
+/// The side of a region, in units of the reach at least, and for so many substeps by what motions anywhere differ by.
+const REGION: f32 = 12.0;
+const REGION_LASTS: f32 = 3.0;
 
-/// The most pairs that lists hold, of some sixty bytes each, unless so many nodes have the fewest of them; and the fewest
+/// The most pairs that lists hold, of eight bytes each, unless so many nodes have the fewest of them; and the fewest
 /// and most that an edge may have: more only where strands lie in one place by the hundred.
 const MOST_PAIRS_OF_ALL: usize = 8 << 20;
 const MOST_PAIRS_OF_AN_EDGE: [usize; 2] = [32, 1024];
 
-/// How far strands that meet may come in a substep before lists have to be built again, over what is asked for.
-const SPARE: f32 = 1.5;
+/// Half the length of the pieces in which edges are put into the grid, in units of reach and mean margin.
+const HALF_PIECE: f32 = 0.7;
 
-/// Half the length of the pieces in which edges are put into the grid, in units of reach and margin.
-const HALF_PIECE: f32 = 0.5;
+/// Edges whose pairs may be farther than this, in units of the mean, search in several boxes.
+const MOST_IN_A_BOX: f32 = 2.0;
 
 /// Subdivision of the grid's cells: see `neighbours.rs`.
 const SLICED: Vec3 = Vec3::new(4.0, 1.0, 1.0);
 
 /// Cost per node (ns).
-const MEASURE: usize = 3;
 const SEARCH: usize = 400;
 
 /// Scratch space of a search.
 #[derive(Default)]
 struct Scratch {
     close_by: Stack,
+    /// For each node, the last edge that has met the one which starts there.
+    met_by: Vec<u32>,
     edges: Vec<u32>,
     /// Edges that are near, by their distance (m).
     near: Vec<(f32, u32)>,
 }
 
 impl Lists {
-    fn within(&self) -> f32 {
-        self.reach * (1.0 + self.margin)
-    }
-
-    /// How far apart the middles of pieces are that are near each other, at most.
-    fn close(&self) -> f32 {
-        self.within() * (1.0 + 2.0 * HALF_PIECE)
+    /// How far from the edge that starts at a node others are that are its pairs (m), at most.
+    fn within(&self, node: usize) -> f32 {
+        let margins = self.regions.of(node).iter().map(|cell| self.margins[*cell as usize]);
+        self.reach + margins.fold(0.0, f32::max)
     }
 
     /// The number of pieces of an edge, and their middles.
     fn pieces_of(&self, places: &[Row], edge: u32) -> impl Iterator<Item = Vec3> + use<> {
         let (a, b) = (place(&places[edge as usize]), place(&places[edge as usize + 1]));
         // An absurdly long edge is cut into at most 64 pieces.
-        let n = (a.distance(b) / (2.0 * HALF_PIECE * self.within())).ceil().clamp(1.0, 64.0);
+        let n = (a.distance(b) / (2.0 * self.half_piece)).ceil().clamp(1.0, 64.0);
         (0..n as u32).map(move |k| a.lerp(b, (k as f32 + 0.5) / n))
     }
 
-    fn begin(&mut self, places: &[Row], strands: &[Range<u32>], margin: f32) {
-        self.margin = margin;
+    /// Boxes around a place that reach as far.
+    fn boxes(&self, middle: Vec3, reach: f32) -> impl Iterator<Item = [Vec3; 2]> + use<> {
+        let n = (reach / self.half_box).ceil().clamp(1.0, 16.0) as u32;
+        let side = 2.0 * reach / n as f32;
+        (0..n * n * n).map(move |k| {
+            let at = Vec3::new((k % n) as f32, (k / n % n) as f32, (k / (n * n)) as f32);
+            let low = middle - reach + at * side;
+            [low, low + side]
+        })
+    }
+
+    /// Whether no pair is missing that may be near now, or whose cores may be at the end of the substep, by the `way` that
+    /// each node goes in it.
+    fn is_complete(&mut self, places: &[Row], core: f32, way: impl Fn(usize) -> Vec3) -> bool {
+        let Self { regions, margins, differences, places: before, reach, .. } = self;
+        let moved = |node: usize| {
+            let now = place(&places[node]) - place(&before[node]);
+            [now, now + way(node)]
+        };
+        let mut all = [Extent::default(); 2];
+        for node in 0..places.len() - 2 {
+            let moved = moved(node);
+            all.iter_mut().zip(moved).for_each(|(all, motion)| all.add(motion));
+        }
+        // Cores are thinner than what reaches.
+        let spare = *reach - core.min(*reach);
+        let fits = |[now, then]: [f32; 2], margin: f32| now <= margin && then <= margin + spare;
+        let all = all.map(Extent::across);
+        let least = margins.iter().copied().fold(f32::INFINITY, f32::min);
+        if fits(all, least) {
+            return true;
+        }
+        if !fits(all, regions.size() - *reach) {
+            return false;
+        }
+        regions.differences(moved, differences);
+        differences.iter().zip(&*margins).all(|(differ, margin)| fits(*differ, *margin))
+    }
+
+    /// Chooses regions and their margins for nodes that go such a `way` in a substep, where lists hold so many pairs a node.
+    fn choose_margins(&mut self, places: &[Row], pairs: f32, way: impl Fn(usize) -> Vec3) {
+        let Self { regions, margins, differences, strands, reach, .. } = self;
+        let nodes = places.len() - 2;
+        let mut all = Extent::default();
+        (0..nodes).for_each(|node| all.add(way(node)));
+        let size = f32::max(REGION * *reach, REGION_LASTS * all.across() + *reach);
+        regions.begin(&places[..nodes], strands, size);
+        regions.differences(|node| [way(node); 2], differences);
+        // Pairs grow with the square of the distance.
+        let mean = 2.0 * self.half_piece;
+        let most = (MOST_PAIRS / pairs.max(1e-3)).sqrt() * mean - *reach;
+        let [least, last] = MARGINS.map(|margin| margin * *reach);
+        let margin = |[differ, _]: &[f32; 2]| (LASTS * differ).min(most.max(*differ));
+        margins.clear();
+        margins.extend(differences.iter().map(|differ| margin(differ).clamp(least, last)));
+    }
+
+    fn begin(&mut self, places: &[Row]) {
+        let (mut sum, mut count, mut most) = (0.0, 0.0, self.reach);
+        for within in edges(&self.strands).map(|edge| self.within(edge)) {
+            (sum, count, most) = (sum + within, count + 1.0, most.max(within));
+        }
+        let mean = f32::max(sum / f32::max(count, 1.0), self.reach);
+        self.half_piece = HALF_PIECE * mean;
+        self.half_box = most.min(MOST_IN_A_BOX * mean) + 2.0 * self.half_piece;
         self.most = (MOST_PAIRS_OF_ALL / places.len())
             .clamp(MOST_PAIRS_OF_AN_EDGE[0], MOST_PAIRS_OF_AN_EDGE[1]);
         self.places.clear();
         self.places.extend_from_slice(places);
-        self.strands.clear();
-        self.strands.extend_from_slice(strands);
         let mut unsorted = core::mem::take(&mut self.unsorted);
         unsorted.clear();
-        for edge in strands.iter().flat_map(|s| s.start..s.end.saturating_sub(1)) {
+        for edge in edges(&self.strands).map(|edge| edge as u32) {
             unsorted.extend(self.pieces_of(places, edge).map(|middle| (middle, edge)));
         }
         self.unsorted = unsorted;
         let numbered = self.unsorted.iter().zip(0..).map(|((middle, _), k)| (*middle * SLICED, k));
-        self.grid.build(2.002 * self.close(), numbered);
+        self.grid.build(2.002 * self.half_box, numbered);
         let sorted = self.grid.order().map(|k| self.unsorted[k as usize]);
         Pieces::collect(sorted, &mut self.pieces);
     }
 }
 
-impl Pairs {
-    /// Builds the lists again where they may miss a pair.
-    pub(super) fn look_up(&mut self, contact: &Contact<f32>) {
-        let Self { places, velocities, strands, lists, parts, .. } = self;
-        let nodes = places.len() - 2;
-        let is_other = lists.reach != contact.reach || lists.strands != *strands;
-        parts.resize_with(strands.len().div_ceil(PART), PartPairs::default);
-        // What all move alike brings none nearer to another.
-        let drift = if is_other {
-            Vec3::ZERO
-        } else {
-            mean(&places[..nodes]) - mean(&lists.places[..nodes])
-        };
-        let speed = mean(&velocities[..nodes]);
-        let each = Nanos(MEASURE * nodes / parts.len().max(1));
-        let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
-        for_each_block(
-            &mut work,
-            each,
-            || (),
-            |(), (part, strands)| {
-                let start = strands.first().map_or(0, |s| s.start) as usize;
-                let own = start..strands.last().map_or(start, |s| s.end as usize);
-                let fastest =
-                    velocities[own.clone()].iter().map(|v| place(v).distance_squared(speed));
-                part.fastest = fastest.fold(0.0, larger);
-                part.moved = 0.0;
-                if !is_other {
-                    let moved = places[own.clone()].iter().zip(&lists.places[own]);
-                    let moved = moved.map(|(p, q)| (place(p) - drift).distance_squared(place(q)));
-                    part.moved = moved.fold(0.0, larger);
-                }
-            },
-        );
-        let largest = |of: fn(&PartPairs) -> f32| parts.iter().map(of).fold(0.0, larger).sqrt();
-        let (moved, fastest) = (largest(|part| part.moved), largest(|part| part.fastest));
-        // Both of a pair may move by so much since, and in this substep.
-        let meet = 2.0 * contact.dt * fastest;
-        let is_complete = 2.0 * moved + meet <= lists.margin * contact.reach;
-        if !is_other && is_complete {
+/// The edges of all strands, by their first nodes.
+fn edges(strands: &[Range<u32>]) -> impl Iterator<Item = usize> {
+    strands.iter().flat_map(|s| s.start as usize..s.end.saturating_sub(1) as usize)
+}
+
+impl Lists {
+    /// Builds the lists again where they may miss a pair of which each node goes such a `way` in the substep (m).
+    pub(super) fn look_up(
+        &mut self,
+        parts: &mut Vec<PartPairs>,
+        places: &[Row],
+        strands: &[Range<u32>],
+        contact: &Contact<f32>,
+        way: impl Fn(usize) -> Vec3,
+    ) {
+        let is_other = self.reach != contact.reach || self.strands != *strands;
+        // Only cores need pairs before they are near.
+        let ahead = |node: usize| if contact.core > 0.0 { way(node) } else { Vec3::ZERO };
+        if !is_other && self.is_complete(places, contact.core, ahead) {
             return;
         }
-        let wanted = (SPARE * meet / contact.reach).clamp(MARGIN, MOST_MARGIN);
-        let pairs: usize = parts.iter().map(|part| part.seconds.len()).sum();
-        let margin = if wanted.is_nan() { MARGIN } else { wanted };
-        (self.lists.reach, self.lists.core) = (contact.reach, contact.core);
-        self.build(margin, is_other, pairs);
-    }
-
-    fn build(&mut self, wanted: f32, is_other: bool, pairs: usize) {
-        let nodes = self.places.len() - 2;
-        // Pairs grow with the square of the distance.
-        let known = if is_other { 0.0 } else { pairs as f32 / nodes.max(1) as f32 };
-        let most = (MOST_PAIRS / known.max(1e-3)).sqrt() * (1.0 + self.lists.margin) - 1.0;
-        let margin = wanted.min(most.max(MARGIN));
         if is_other {
-            self.parts.iter_mut().for_each(PartPairs::forget);
+            parts.iter_mut().for_each(PartPairs::forget);
         }
-        let (places, strands) =
-            (core::mem::take(&mut self.places), core::mem::take(&mut self.strands));
-        self.build_of(&places, &strands, margin);
-        (self.places, self.strands) = (places, strands);
+        let pairs: usize = parts.iter().map(|part| part.seconds.len()).sum();
+        (self.reach, self.core) = (contact.reach, contact.core);
+        self.strands.clear();
+        self.strands.extend_from_slice(strands);
+        self.choose_margins(places, pairs as f32 / places.len() as f32, way);
+        self.build(parts, places);
     }
 
     /// Builds the lists of nodes at these places, padded with two that are not numbers.
-    fn build_of(&mut self, places: &[Row], strands: &[Range<u32>], margin: f32) {
-        let Self { lists, parts, .. } = self;
-        let nodes = places.len() - 2;
-        parts.resize_with(strands.len().div_ceil(PART), PartPairs::default);
-        lists.begin(places, strands, margin);
+    fn build(&mut self, parts: &mut Vec<PartPairs>, places: &[Row]) {
+        self.begin(places);
+        let lists = &*self;
+        parts.resize_with(lists.strands.len().div_ceil(PART), PartPairs::default);
         let level = simd_level();
-        let each = Nanos(SEARCH * nodes / parts.len().max(1));
-        let lists = &*lists;
-        let mut work: Vec<_> = parts.iter_mut().zip(strands.chunks(PART)).collect();
+        let each = Nanos(SEARCH * places.len() / parts.len().max(1));
+        let mut work: Vec<_> = parts.iter_mut().zip(lists.strands.chunks(PART)).collect();
         for_each_block(
             &mut work,
             each,
@@ -174,24 +202,6 @@ impl Pairs {
                 dispatch!(level, simd => part.search(simd, places, strands, lists, scratch));
             },
         );
-        // The other way round, by counting.
-        let Self { parts, second_starts, by_second, .. } = self;
-        second_starts.clear();
-        second_starts.resize(nodes + 2, 0);
-        for second in parts.iter().flat_map(|part| &part.seconds) {
-            second_starts[*second as usize + 2] += 1;
-        }
-        for k in 1..second_starts.len() {
-            second_starts[k] += second_starts[k - 1];
-        }
-        by_second.resize(second_starts.last().map_or(0, |end| *end as usize), [0; 2]);
-        for (k, part) in parts.iter().enumerate() {
-            for (number, second) in part.seconds.iter().enumerate() {
-                let next = &mut second_starts[*second as usize + 1];
-                by_second[*next as usize] = [k as u32, number as u32];
-                *next += 1;
-            }
-        }
     }
 }
 
@@ -200,12 +210,18 @@ impl Pairs {
     pub(crate) fn record(&mut self, tape: &mut Tape<'_>) {
         let mut places = core::mem::take(&mut self.lists.places);
         let mut ends: Vec<u32> = self.lists.strands.iter().map(|strand| strand.end).collect();
-        let mut pasts: Vec<Row> = self.parts.iter().flat_map(|part| &part.pasts).copied().collect();
+        let kept = || self.parts.iter().flat_map(|part| &part.kept);
+        let mut counts: Vec<u32> = self.parts.iter().map(|part| part.kept.len() as u32).collect();
+        let mut numbers: Vec<u32> = kept().map(|kept| kept.number).collect();
+        let mut pasts: Vec<Row> = kept().map(|kept| kept.past).collect();
         tape.list(&mut places);
         tape.list(&mut ends);
-        let Lists { reach, core, margin, .. } = &mut self.lists;
-        tape.values([reach, core, margin]);
-        let margin = *margin;
+        let Lists { reach, core, regions, margins, .. } = &mut self.lists;
+        let mut size = regions.size();
+        tape.values([reach, core, &mut size]);
+        tape.list(margins);
+        tape.list(&mut counts);
+        tape.list(&mut numbers);
         tape.list(&mut pasts);
         if let Tape::Write(_) = tape {
             self.lists.places = places;
@@ -219,23 +235,23 @@ impl Pairs {
             return;
         }
         let starts = core::iter::once(0).chain(ends.iter().copied());
-        let strands: Vec<Range<u32>> = starts.zip(&ends).map(|(start, end)| start..*end).collect();
-        self.build_of(&places, &strands, margin);
-        let own = self.parts.iter_mut().flat_map(|part| &mut part.pasts);
-        own.zip(pasts).for_each(|(own, past)| *own = past);
+        self.lists.strands = starts.zip(&ends).map(|(start, end)| start..*end).collect();
+        self.lists.regions.begin(&places[..nodes], &self.lists.strands, size);
+        self.lists.build(&mut self.parts, &places);
+        let mut kept = numbers.into_iter().zip(pasts).map(|(number, past)| Kept { number, past });
+        for (part, count) in self.parts.iter_mut().zip(counts) {
+            part.kept.clear();
+            part.kept.extend(kept.by_ref().take(count as usize));
+        }
     }
-}
-
-/// The larger of two numbers, NaN if either is.
-fn larger(a: f32, b: f32) -> f32 {
-    if b <= a || a.is_nan() { a } else { b }
 }
 
 impl PartPairs {
     fn forget(&mut self) {
         self.starts.clear();
         self.seconds.clear();
-        self.pasts.clear();
+        self.built.clear();
+        self.kept.clear();
     }
 
     /// Builds the lists of these strands' edges. Pairs that were there before keep their past.
@@ -246,18 +262,21 @@ impl PartPairs {
         places: &[Row],
         strands: &[Range<u32>],
         lists: &Lists,
-        Scratch { close_by, edges, near }: &mut Scratch,
+        Scratch { close_by, met_by, edges, near }: &mut Scratch,
     ) {
-        let Self { first: own_first, starts, seconds, pasts, before, is_crowded, .. } = self;
+        let Self { first: own_first, starts, seconds, built, kept, before, is_crowded, .. } = self;
         *is_crowded = false;
         core::mem::swap(&mut before.0, starts);
         core::mem::swap(&mut before.1, seconds);
-        core::mem::swap(&mut before.2, pasts);
-        let (close, within) = (lists.close() * lists.close(), lists.within());
+        core::mem::swap(&mut before.2, kept);
         let nowhere = places.len() as u32 - 2;
+        met_by.clear();
+        met_by.resize(places.len(), nowhere);
         starts.clear();
         seconds.clear();
-        pasts.clear();
+        built.clear();
+        kept.clear();
+        let mut memory = Memory(&before.2);
         let reach = f32x8::splat(simd, lists.reach);
         let first = strands.first().map_or(0, |s| s.start);
         *own_first = first;
@@ -269,22 +288,28 @@ impl PartPairs {
                     continue;
                 }
                 edges.clear();
+                let within = lists.within(a as usize);
+                // How far apart the middles of pieces are that are near each other, at most.
+                let close = within + 2.0 * lists.half_piece;
                 for middle in lists.pieces_of(places, a) {
-                    let around = [middle - lists.close(), middle + lists.close()];
-                    let rows = lists.grid.rows_in_box(around[0] * SLICED, around[1] * SLICED);
-                    let sixteens = rows.map(|r| match r.is_empty() {
-                        true => &[],
-                        false => &lists.pieces[r.start / 16..r.end.div_ceil(16)],
-                    });
-                    close_by.clear(sixteens.iter().map(|s| s.len() * 16).sum());
-                    for pieces in sixteens.into_iter().flatten() {
-                        pieces.close(simd, middle, close, close_by);
+                    for around in lists.boxes(middle, close) {
+                        let rows = lists.grid.rows_in_box(around[0] * SLICED, around[1] * SLICED);
+                        let sixteens = rows.map(|r| match r.is_empty() {
+                            true => &[],
+                            false => &lists.pieces[r.start / 16..r.end.div_ceil(16)],
+                        });
+                        close_by.clear(sixteens.iter().map(|s| s.len() * 16).sum());
+                        for pieces in sixteens.into_iter().flatten() {
+                            pieces.close(simd, middle, close * close, close_by);
+                        }
+                        // Of two edges the first has the pair, once.
+                        for b in close_by.items().iter().filter(|b| **b >= own.end) {
+                            if core::mem::replace(&mut met_by[*b as usize], a) != a {
+                                edges.push(*b);
+                            }
+                        }
                     }
-                    // Of two edges the first has the pair.
-                    edges.extend(close_by.items().iter().filter(|b| **b >= own.end));
                 }
-                edges.sort_unstable();
-                edges.dedup();
                 near.clear();
                 for some in edges.chunks(WIDTH) {
                     let mut b = [nowhere; WIDTH];
@@ -301,13 +326,18 @@ impl PartPairs {
                         d.total_cmp(e).then(b.cmp(c))
                     });
                     near.truncate(lists.most);
-                    near.sort_unstable_by_key(|(_, second)| *second);
                 }
-                let mut old = before_of(before, (a - first) as usize);
+                near.sort_unstable_by_key(|(_, second)| *second);
+                let mut old = Old::of_edge(before, (a - first) as usize);
                 for (distance, second) in &*near {
-                    let new = [0.0, 0.0, 0.0, if *distance < lists.core { -0.0 } else { 0.0 }];
+                    let number = seconds.len() as u32;
+                    let past = match old.number(*second) {
+                        Some(known) => memory.of(known),
+                        None => (*distance < lists.core).then_some([0.0, 0.0, 0.0, -0.0]),
+                    };
+                    kept.extend(past.map(|past| Kept { number, past }));
                     seconds.push(*second);
-                    pasts.push(old.of(*second).unwrap_or(new));
+                    built.push(*distance);
                 }
             }
         }
@@ -315,29 +345,23 @@ impl PartPairs {
     }
 }
 
-/// The pairs that an edge had.
+/// The pairs that an edge had: the number of the first, and their second edges.
 struct Old<'a> {
+    first: u32,
     seconds: &'a [u32],
-    pasts: &'a [Row],
 }
 
-fn before_of((starts, seconds, pasts): &(Vec<u32>, Vec<u32>, Vec<Row>), edge: usize) -> Old<'_> {
-    let own = starts.get(edge..edge + 2).map_or(0..0, |w| w[0] as usize..w[1] as usize);
-    let (seconds, pasts) = (seconds.get(own.clone()), pasts.get(own));
-    let (Some(seconds), Some(pasts)) = (seconds, pasts) else {
-        return Old { seconds: &[], pasts: &[] };
-    };
-    Old { seconds, pasts }
-}
+impl<'a> Old<'a> {
+    fn of_edge((starts, seconds, _): &'a (Vec<u32>, Vec<u32>, Vec<Kept>), edge: usize) -> Self {
+        let [first, end] = starts.get(edge..edge + 2).map_or([0; 2], |w| [w[0], w[1]]);
+        let seconds = seconds.get(first as usize..end as usize).unwrap_or_default();
+        Self { first, seconds }
+    }
 
-impl Old<'_> {
-    /// What a pair had; asked for in ascending order.
-    fn of(&mut self, second: u32) -> Option<Row> {
-        let next = self.seconds.iter().take_while(|known| **known < second).count();
-        (self.seconds, self.pasts) = (&self.seconds[next..], &self.pasts[next..]);
-        match self.seconds.first() {
-            Some(known) if *known == second => self.pasts.first().copied(),
-            _ => None,
-        }
+    /// The number that a pair had; asked for in ascending order.
+    fn number(&mut self, second: u32) -> Option<u32> {
+        let passed = self.seconds.iter().take_while(|known| **known < second).count();
+        (self.first, self.seconds) = (self.first + passed as u32, &self.seconds[passed..]);
+        self.seconds.first().filter(|known| **known == second).map(|_| self.first)
     }
 }

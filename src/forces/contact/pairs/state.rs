@@ -1,8 +1,9 @@
 //! Pairs, lists of them, and what a substep makes of both.
 
 use super::{
-    geometry::{Edge, Seen, see},
+    geometry::{Edge, Row, Seen, place, see},
     kick::{Contact, Moving, Past, acts, kick},
+    regions::Regions,
 };
 use crate::{
     base::{
@@ -26,11 +27,8 @@ pub(super) const PART: usize = 16;
 const SEE: usize = 12;
 const KICK: usize = 20;
 
-/// Cost per node (ns): its share of all impulses.
-const GATHER: usize = 20;
-
-/// Three numbers of a node or of a pair, and one more.
-pub(super) type Row = [f32; 4];
+/// The share of the cores' distance at which cores that overlapped from the start are firm from then on.
+pub(super) const FIRM_AGAIN: f32 = 1.25;
 
 /// A node of a strand.
 #[derive(Clone, Copy, Debug, Default)]
@@ -49,6 +47,8 @@ pub(crate) struct Pairs {
     /// The nodes' places and inverse masses, velocities and the counts of pairs that push them.
     pub(super) places: Vec<Row>,
     pub(super) velocities: Vec<Row>,
+    /// How each edge has moved since lists were built, and will have at the end of a substep.
+    pub(super) moved: [Vec<Row>; 2],
     /// The nodes of each strand.
     pub(super) strands: Vec<Range<u32>>,
     /// Which nodes of fine strands are sampled.
@@ -57,10 +57,6 @@ pub(crate) struct Pairs {
     pub(super) is_found: bool,
     pub(super) lists: Lists,
     pub(super) parts: Vec<PartPairs>,
-    /// For each edge, where the pairs of which it is the second begin among `by_second`, and these pairs by part and
-    /// number.
-    pub(super) second_starts: Vec<u32>,
-    pub(super) by_second: Vec<[u32; 2]>,
     /// What all pairs do to each node (m/s).
     pub(super) kicks: Vec<Vec3>,
     pub(super) scratch: Scratch,
@@ -73,44 +69,60 @@ pub(super) struct PartPairs {
     pub(super) first: u32,
     /// For each edge, where its pairs begin, and where the last one's end.
     pub(super) starts: Vec<u32>,
-    /// The second edge of each.
+    /// The second edge of each, and how far apart both were when lists were built (m).
     pub(super) seconds: Vec<u32>,
-    /// How far each has slid since it stuck (m), and the impulse that has pressed it; with a minus while its cores
-    /// overlap from the start, which are not kept apart until they have once been apart.
-    pub(super) pasts: Vec<Row>,
-    /// The impulse of each on its first edge, and where both are touched.
-    pub(super) impulses: Vec<Impulse>,
-    /// Those that act in this substep, in their order.
+    pub(super) built: Vec<f32>,
+    /// What some remember, by their numbers.
+    pub(super) kept: Vec<Kept>,
+    /// Those that act in this substep, by their numbers.
     pub(super) active: Vec<Active>,
-    /// How far apart each was at the start of the substep (m).
-    pub(super) distances: Vec<f32>,
-    /// The square of how far a node has moved since lists were built (m²).
-    pub(super) moved: f32,
-    /// The square of how fast its fastest node moves against the mean of all (m²/s²).
-    pub(super) fastest: f32,
+    /// Those that may be near, by how their edges have moved.
+    pub(super) near: Vec<Near>,
     /// Whether an edge had more pairs than it may have.
     pub(super) is_crowded: bool,
     /// Scratch space of a search.
-    pub(super) before: (Vec<u32>, Vec<u32>, Vec<Row>),
+    pub(super) before: (Vec<u32>, Vec<u32>, Vec<Kept>),
 }
 
-/// What a pair does: an impulse on its first edge, the reverse on its second.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Impulse {
-    pub(super) push: Vec3,
-    /// Where on the edges (0…1).
-    pub(super) at: [f32; 2],
+/// What a pair remembers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Kept {
+    pub(super) number: u32,
+    /// How far it has slid since it stuck (m), and the impulse that has pressed it; with a minus while its cores overlap
+    /// from the start, which are not kept apart until they have once been apart.
+    pub(super) past: Row,
 }
 
-/// A pair that acts.
+/// What pairs remember, asked for in the order of their numbers.
+pub(super) struct Memory<'a>(pub(super) &'a [Kept]);
+
+impl Memory<'_> {
+    pub(super) fn of(&mut self, number: u32) -> Option<Row> {
+        let passed = self.0.iter().take_while(|kept| kept.number < number).count();
+        self.0 = &self.0[passed..];
+        self.0.first().filter(|kept| kept.number == number).map(|kept| kept.past)
+    }
+}
+
+/// A pair that may be near: its number in its part, and its edges.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Near {
+    pub(super) number: u32,
+    pub(super) edges: [u32; 2],
+}
+
+/// A pair that acts, or one whose cores overlap from the start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Active {
     /// Its number in its part, and its edges.
     pub(super) number: u32,
     pub(super) edges: [u32; 2],
-    /// How much of one it is for others at its nodes (0…1).
+    /// How much of one it is for others at its nodes (0…1); 0 does not act.
     pub(super) share: f32,
     pub(super) seen: Seen<f32>,
+    pub(super) past: Row,
+    /// The impulse on its first edge; its second has the reverse.
+    pub(super) push: Vec3,
 }
 
 /// The state that lists were built from.
@@ -123,7 +135,14 @@ pub(super) struct Lists {
     pub(super) strands: Vec<Range<u32>>,
     pub(super) reach: f32,
     pub(super) core: f32,
-    pub(super) margin: f32,
+    /// Cells, by how much motions may differ in each before lists are built again, and do (m).
+    pub(super) regions: Regions,
+    pub(super) margins: Vec<f32>,
+    pub(super) differences: Vec<[f32; 2]>,
+    /// Half the length of the pieces in which edges are put into the grid (m).
+    pub(super) half_piece: f32,
+    /// Half the side of the boxes that the grid is made for (m).
+    pub(super) half_box: f32,
     /// The most pairs that an edge may have, the nearest.
     pub(super) most: usize,
 }
@@ -133,18 +152,20 @@ pub(super) struct Lists {
 pub(super) struct Close {
     /// The part of its first edge, and its number there.
     pub(super) part: usize,
-    pub(super) number: usize,
+    pub(super) number: u32,
     pub(super) edges: [u32; 2],
     pub(super) normal: Vec3,
     /// The gap along `normal` that has to be left (m).
     pub(super) least: f32,
+    /// The impulse by which its cores have been kept apart.
+    pub(super) borne: f32,
+    /// Whether they could not be.
+    pub(super) gives_way: bool,
 }
 
 /// Scratch space.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
-    /// How far each node has moved (m).
-    pub(super) moved: Vec<f32>,
     pub(super) close: Vec<Close>,
     /// Nodes that are too near, by how much (m), and of which pair.
     pub(super) violated: Vec<([usize; 2], f32, usize)>,
@@ -152,17 +173,6 @@ pub(super) struct Scratch {
     pub(super) counts: Vec<f32>,
     /// Whether each strand has been moved.
     pub(super) touched: Vec<bool>,
-}
-
-pub(super) fn place(row: &Row) -> Vec3 {
-    Vec3::new(row[0], row[1], row[2])
-}
-
-/// The mean place of those that are finite.
-pub(super) fn mean(rows: &[Row]) -> Vec3 {
-    let finite = rows.iter().map(place).filter(|p| p.is_finite());
-    let (sum, count) = finite.fold((Vec3::ZERO, 0.0), |(sum, n), p| (sum + p, n + 1.0));
-    sum / f32::max(count, 1.0)
 }
 
 impl Pairs {
@@ -202,19 +212,25 @@ impl Pairs {
             rows.truncate(nodes);
             rows.extend([[f32::NAN; 4]; 2]);
         }
-        self.look_up(&contact);
+        let Self { places, velocities, moved, strands, lists, parts, .. } = self;
+        let ahead = |node: usize| contact.dt * place(&velocities[node]);
+        lists.look_up(parts, places, strands, &contact, ahead);
+        let way = |node: usize| place(&places[node]) - place(&lists.places[node]);
+        measure(&mut moved[0], nodes, way);
+        measure(&mut moved[1], nodes, |node| way(node) + ahead(node));
         let level = simd_level();
-        let Self { places, velocities, parts, .. } = self;
         let pairs: usize = parts.iter().map(|part| part.seconds.len()).sum();
         let each = |nanos: usize, count: usize| Nanos(nanos * count / parts.len().max(1));
         let (see_each, kick_each) = (each(SEE, pairs), each(KICK, pairs));
-        let gather_each = each(GATHER, nodes);
         for_each_block(
             parts,
             see_each,
             || (),
             |(), part| {
-                dispatch!(level, simd => part.see(simd, places, velocities, &contact));
+                dispatch!(level, simd => {
+                    part.sift(simd, moved, [contact.reach, contact.core]);
+                    part.see(simd, places, velocities, &contact);
+                });
             },
         );
         for active in parts.iter().flat_map(|part| &part.active) {
@@ -230,26 +246,18 @@ impl Pairs {
                 dispatch!(level, simd => part.kick(simd, places, velocities, &contact));
             },
         );
-        let Self { places, strands, parts, second_starts, by_second, kicks, .. } = self;
+        let Self { places, parts, kicks, .. } = self;
+        kicks.clear();
         kicks.resize(nodes, Vec3::ZERO);
-        let mut rest = &mut kicks[..];
-        let mut work = Vec::new();
-        for (k, strands) in strands.chunks(PART).enumerate() {
-            let first = strands.first().map_or(0, |s| s.start);
-            let end = strands.last().map_or(first, |s| s.end);
-            let (own, after) = rest.split_at_mut((end - first) as usize);
-            rest = after;
-            work.push((k, strands, own));
+        for Active { edges, seen, push, .. } in parts.iter().flat_map(|part| &part.active) {
+            let [a0, a1, b0, b1] = nodes_of(*edges);
+            let [a, b] = seen.at.map(|at| *push * at);
+            kicks[a0] += *push - a;
+            kicks[a1] += a;
+            kicks[b0] -= *push - b;
+            kicks[b1] -= b;
         }
-        let parts = &parts[..];
-        for_each_block(
-            &mut work,
-            gather_each,
-            || (),
-            |(), (k, strands, kicks)| {
-                parts[*k].gather(parts, strands, (second_starts, by_second), places, kicks);
-            },
-        );
+        kicks.iter_mut().zip(places).for_each(|(kick, place)| *kick *= place[3]);
     }
 
     /// Until [`find`](Self::find) there are no pairs.
@@ -291,6 +299,22 @@ impl Pairs {
     }
 }
 
+/// How the edges that start at so many nodes have moved: their middles, and how far their ends have moved against them
+/// (m). Points of two edges have come nearer by no more than their middles and both of these together.
+pub(super) fn measure(rows: &mut Vec<Row>, nodes: usize, way: impl Fn(usize) -> Vec3) {
+    rows.clear();
+    let mut before = Vec3::ZERO;
+    for node in 0..nodes {
+        let own = way(node);
+        if node > 0 {
+            rows.push((0.5 * (before + own)).extend(0.5 * before.distance(own)).to_array());
+        }
+        before = own;
+    }
+    // The last node starts no edge, nor do those that are not numbers.
+    rows.resize(nodes + 2, [f32::NAN; 4]);
+}
+
 /// Whether a pair's cores overlap from the start, by what it remembers.
 pub(super) fn overlaps(past: &Row) -> bool {
     past[3].is_sign_negative()
@@ -328,6 +352,34 @@ pub(super) fn stored<S: Simd>(lanes: f32x8<S>) -> [f32; WIDTH] {
 }
 
 #[inline(always)]
+fn stored_columns<S: Simd, const N: usize>(columns: &[f32x8<S>; N]) -> [[f32; WIDTH]; N] {
+    let mut all = [[0.0; WIDTH]; N];
+    for k in 0..N {
+        columns[k].store_array(&mut all[k]);
+    }
+    all
+}
+
+#[inline(always)]
+fn loaded_columns<S: Simd, const N: usize>(simd: S, all: &[[f32; WIDTH]; N]) -> [f32x8<S>; N] {
+    let mut columns = [f32x8::splat(simd, 0.0); N];
+    for k in 0..N {
+        columns[k] = f32x8::load_array_ref(simd, &all[k]);
+    }
+    columns
+}
+
+/// One lane of all columns.
+#[inline(always)]
+fn lane<const N: usize>(columns: &[[f32; WIDTH]; N], lane: usize) -> [f32; N] {
+    let mut all = [0.0; N];
+    for k in 0..N {
+        all[k] = columns[k][lane];
+    }
+    all
+}
+
+#[inline(always)]
 pub(super) fn edge<S: Simd>(
     simd: S,
     rows: &[Row],
@@ -339,6 +391,39 @@ pub(super) fn edge<S: Simd>(
 }
 
 impl PartPairs {
+    /// Finds the pairs that may have come within these distances (m), each by how edges have `moved`.
+    #[inline(always)]
+    pub(super) fn sift<S: Simd>(&mut self, simd: S, moved: &[Vec<Row>; 2], within: [f32; 2]) {
+        let Self { first, starts, seconds, built, near, .. } = self;
+        near.clear();
+        for (a, w) in (*first..).zip(starts.windows(2)) {
+            let own = w[0] as usize..w[1] as usize;
+            for k in own.clone().step_by(WIDTH) {
+                let end = own.end.min(k + WIDTH);
+                let mut b = [a; WIDTH];
+                b[..end - k].copy_from_slice(&seconds[k..end]);
+                let mut apart = [f32::NAN; WIDTH];
+                apart[..end - k].copy_from_slice(&built[k..end]);
+                let apart = f32x8::load_array_ref(simd, &apart);
+                let mut is_near = 0;
+                for (rows, within) in moved.iter().zip(within) {
+                    let [x, y, z, own] = rows[a as usize];
+                    let (x, y) = (f32x8::splat(simd, x), f32x8::splat(simd, y));
+                    let (z, own) = (f32x8::splat(simd, z), f32x8::splat(simd, own));
+                    let (other, others) = eight(simd, rows, &b, 0);
+                    let off = V3::new(x, y, z) - other;
+                    let way = Real::sqrt(off.dot(off)) + own + others;
+                    is_near |= Real::lt(apart - way, f32x8::splat(simd, within)).to_bitmask();
+                }
+                while is_near != 0 {
+                    let l = is_near.trailing_zeros() as usize;
+                    is_near &= is_near - 1;
+                    near.push(Near { number: (k + l) as u32, edges: [a, b[l]] });
+                }
+            }
+        }
+    }
+
     /// Finds the pairs that act.
     #[inline(always)]
     fn see<S: Simd>(
@@ -349,44 +434,48 @@ impl PartPairs {
         contact: &Contact<f32>,
     ) {
         let nowhere = places.len() as u32 - 2;
-        self.active.clear();
-        self.distances.clear();
+        let Self { near, kept, active, .. } = self;
+        active.clear();
+        let mut memory = Memory(kept);
         let lanes = contact.splat(f32x8::splat(simd, 0.0));
-        let edges = (self.first..).zip(self.starts.windows(2));
-        let mut firsts = edges.flat_map(|(edge, w)| (w[0]..w[1]).map(move |_| edge));
-        for (k, seconds) in self.seconds.chunks(WIDTH).enumerate() {
+        for near in near.chunks(WIDTH) {
             let (mut a, mut b) = ([nowhere; WIDTH], [nowhere; WIDTH]);
-            b[..seconds.len()].copy_from_slice(seconds);
-            a[..seconds.len()].iter_mut().zip(&mut firsts).for_each(|(a, first)| *a = first);
+            for (l, near) in near.iter().enumerate() {
+                [a[l], b[l]] = near.edges;
+            }
             let ((edge_a, _), (edge_b, _)) = (edge(simd, places, &a), edge(simd, places, &b));
             let seen = see(edge_a, edge_b, lanes.reach);
             let ((va, _), (vb, _)) = (edge(simd, velocities, &a), edge(simd, velocities, &b));
-            self.distances.extend_from_slice(&stored(seen.distance)[..seconds.len()]);
-            let mut firm = [0.0; WIDTH];
-            let pasts = &mut self.pasts[k * WIDTH..][..seconds.len()];
-            let apart = stored(seen.distance).map(|distance| distance >= contact.core);
-            for ((past, apart), firm) in pasts.iter_mut().zip(apart).zip(&mut firm) {
-                if apart {
+            let distances = stored(seen.distance);
+            let (mut pasts, mut firm) = ([[0.0; 4]; WIDTH], [0.0; WIDTH]);
+            let mut bits = 0;
+            for (l, near) in near.iter().enumerate() {
+                let past = &mut pasts[l];
+                *past = memory.of(near.number).unwrap_or_default();
+                if distances[l] >= FIRM_AGAIN * contact.core {
                     past[3] = past[3].abs();
                 }
-                *firm = is_firm(past, contact);
+                firm[l] = is_firm(past, contact);
+                bits |= u64::from(overlaps(past)) << l;
             }
             let firm = f32x8::load_array_ref(simd, &firm);
             let acts = acts(&seen, [va.start, va.end, vb.start, vb.end], firm, &lanes);
-            let mut bits = Real::lt(f32x8::splat(simd, 0.0), acts).to_bitmask();
+            bits |= Real::lt(f32x8::splat(simd, 0.0), acts).to_bitmask();
             if bits == 0 {
                 continue;
             }
-            let columns = columns(&seen).map(stored);
+            let columns = stored_columns(&columns(&seen));
             let shares = stored(acts);
             while bits != 0 {
                 let l = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
-                self.active.push(Active {
-                    number: (k * WIDTH + l) as u32,
+                active.push(Active {
+                    number: near[l].number,
                     edges: [a[l], b[l]],
                     share: shares[l],
-                    seen: of_columns(columns.map(|lanes| lanes[l])),
+                    seen: of_columns(lane(&columns, l)),
+                    past: pasts[l],
+                    push: Vec3::ZERO,
                 });
             }
         }
@@ -403,27 +492,21 @@ impl PartPairs {
     ) {
         let one = f32x8::splat(simd, 1.0);
         let lanes = contact.splat(one);
-        self.impulses.clear();
-        self.impulses.resize(self.seconds.len(), Impulse::default());
-        // What does not act any more has no past.
-        let mut pasts = core::mem::take(&mut self.before.2);
-        pasts.clear();
-        pasts.resize(self.seconds.len(), [0.0; 4]);
         let nowhere = places.len() as u32 - 2;
-        for some in self.active.chunks(WIDTH) {
+        for some in self.active.chunks_mut(WIDTH) {
             let (mut a, mut b) = ([nowhere; WIDTH], [nowhere; WIDTH]);
             let mut seen = [[0.0; WIDTH]; COLUMNS];
             let mut past = [[0.0; WIDTH]; 5];
             for (l, active) in some.iter().enumerate() {
                 [a[l], b[l]] = active.edges;
                 let all = columns(&active.seen);
-                seen.iter_mut().zip(all).for_each(|(lanes, value)| lanes[l] = value);
-                let own = &self.pasts[active.number as usize];
+                (0..COLUMNS).for_each(|k| seen[k][l] = all[k]);
+                let own = &active.past;
                 (0..3).for_each(|k| past[k][l] = own[k]);
                 (past[3][l], past[4][l]) = (own[3].abs(), is_firm(own, contact));
             }
-            let seen = of_columns(seen.map(|all| f32x8::load_array_ref(simd, &all)));
-            let [x, y, z, bearing, firm] = past.map(|all| f32x8::load_array_ref(simd, &all));
+            let seen = of_columns(loaded_columns(simd, &seen));
+            let [x, y, z, bearing, firm] = loaded_columns(simd, &past);
             let mut past = Past { slip: V3::new(x, y, z), bearing, firm };
             let (va, ca) = edge(simd, velocities, &a);
             let (vb, cb) = edge(simd, velocities, &b);
@@ -431,60 +514,34 @@ impl PartPairs {
             let moving = Moving {
                 velocities: [va.start, va.end, vb.start, vb.end],
                 w: [wa[0], wa[1], wb[0], wb[1]],
-                counts: [ca[0], ca[1], cb[0], cb[1]].map(|count| Real::max(count, one)),
+                counts: [
+                    Real::max(ca[0], one),
+                    Real::max(ca[1], one),
+                    Real::max(cb[0], one),
+                    Real::max(cb[1], one),
+                ],
             };
             let push = kick(&seen, &moving, &mut past, &lanes);
-            let [x, y, z] = [push.x, push.y, push.z].map(stored);
+            let pushes = stored_columns(&[push.x, push.y, push.z]);
             let Past { slip, bearing, .. } = past;
-            let past = [slip.x, slip.y, slip.z, bearing].map(stored);
-            for (l, active) in some.iter().enumerate() {
-                let number = active.number as usize;
-                let push = Vec3::new(x[l], y[l], z[l]);
+            let past = stored_columns(&[slip.x, slip.y, slip.z, bearing]);
+            for (l, active) in some.iter_mut().enumerate().filter(|(_, active)| active.share > 0.0)
+            {
+                let push = Vec3::from_array(lane(&pushes, l));
+                let mut new = [0.0; 4];
                 // What is not finite stays with its strand.
                 if push.is_finite() {
-                    self.impulses[number] = Impulse { push, at: active.seen.at };
-                    pasts[number] = past.map(|lanes| lanes[l]);
+                    (active.push, new) = (push, lane(&past, l));
                 }
+                if overlaps(&active.past) {
+                    new[3] = -new[3];
+                }
+                active.past = new;
             }
         }
-        for (past, _) in pasts.iter_mut().zip(&self.pasts).filter(|(_, old)| overlaps(old)) {
-            past[3] = -past[3];
-        }
-        self.before.2 = core::mem::replace(&mut self.pasts, pasts);
-    }
-
-    /// What all pairs do to these strands' nodes.
-    fn gather(
-        &self,
-        parts: &[Self],
-        strands: &[Range<u32>],
-        (second_starts, by_second): (&[u32], &[[u32; 2]]),
-        places: &[Row],
-        kicks: &mut [Vec3],
-    ) {
-        let first = strands.first().map_or(0, |s| s.start);
-        kicks.fill(Vec3::ZERO);
-        for strand in strands {
-            for edge in strand.start..strand.end.saturating_sub(1) {
-                let (mut sum, mut turn) = (Vec3::ZERO, Vec3::ZERO);
-                let own = (edge - first) as usize;
-                for pair in self.starts[own]..self.starts[own + 1] {
-                    let Impulse { push, at } = self.impulses[pair as usize];
-                    sum += push;
-                    turn += push * at[0];
-                }
-                let seconds = second_starts[edge as usize]..second_starts[edge as usize + 1];
-                for [part, pair] in &by_second[seconds.start as usize..seconds.end as usize] {
-                    let Impulse { push, at } = parts[*part as usize].impulses[*pair as usize];
-                    sum -= push;
-                    turn -= push * at[1];
-                }
-                kicks[own] += sum - turn;
-                kicks[own + 1] += turn;
-            }
-        }
-        for (kick, place) in kicks.iter_mut().zip(&places[first as usize..]) {
-            *kick *= place[3];
-        }
+        // What does not act any more has no past.
+        self.kept.clear();
+        let kept = |active: &Active| Kept { number: active.number, past: active.past };
+        self.kept.extend(self.active.iter().map(kept));
     }
 }

@@ -1,8 +1,9 @@
 //! Pairs in the tick: strands are collected and pushed before the solver's step, and kept apart after it.
 
 use super::{
+    geometry::Row,
     kick::Contact,
-    state::{PairNode, Pairs, Row},
+    state::{PairNode, Pairs},
 };
 use crate::{
     base::{lanes::V3, schedule::EffectiveSubsteps, setting::Settings},
@@ -68,14 +69,14 @@ pub(crate) fn find<'s>(
         };
         pairs.add(places, stride, (0..places.len()).map(node));
     }
-    pairs.find(Contact {
-        reach,
-        core: reach * contact.core,
-        strength: contact.strength,
-        friction: contact.friction,
-        cohesion: contact.cohesion,
-        dt,
-    });
+    pairs.find(numbers_of(contact, dt));
+}
+
+/// What contact is like in a substep of `dt` (s).
+fn numbers_of(contact: &StrandContact, dt: f32) -> Contact<f32> {
+    let reach = 2.0 * contact.radius;
+    let StrandContact { strength, friction, cohesion, .. } = *contact;
+    Contact { reach, core: reach * contact.core, strength, friction, cohesion, dt }
 }
 
 /// A hair of which cores are to stay apart.
@@ -156,7 +157,7 @@ impl Apart<'_> {
         }
         let clearance = contact.radius;
         let push_out = |node: usize, place: Vec3| leave(obstacles, starts[node], place, clearance);
-        let touched = pairs.keep_apart(ends, lengths, (reach * contact.core, dt), push_out);
+        let touched = pairs.keep_apart(ends, lengths, &numbers_of(&contact, dt), push_out);
         moved.extend(ids.iter().zip(touched).filter(|(_, touched)| **touched).map(|(id, _)| *id));
     }
 }

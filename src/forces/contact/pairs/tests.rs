@@ -82,7 +82,7 @@ fn brute(
                 0.0,
                 f64::from(u8::from(seen.distance >= contact.core)),
             ]);
-            if seen.distance >= contact.core {
+            if seen.distance >= f64::from(FIRM_AGAIN) * contact.core {
                 known[4] = 1.0;
             }
             let acts = acts(&seen, velocities, known[4], &contact);

@@ -1,9 +1,6 @@
 //! Tests of strands that are driven at each other.
 
-use super::{
-    super::{kick::Contact, state::PairNode},
-    *,
-};
+use super::{super::state::PairNode, *};
 use glam::DVec3;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
@@ -122,7 +119,7 @@ fn step(pairs: &mut Pairs, ropes: &mut [Rope], contact: Contact<f32>, gravity: V
         }
         (0..4).for_each(|_| limit_lengths(&mut ends[own..], &lengths[own..]));
     }
-    pairs.keep_apart(&mut ends, &lengths, (contact.core, dt), |_, p| p);
+    pairs.keep_apart(&mut ends, &lengths, &contact, |_, p| p);
     let mut ends = ends.iter();
     for rope in ropes {
         for (p, v) in rope.places.iter_mut().zip(&mut rope.velocities) {
