@@ -16,8 +16,8 @@ use crate::{
 };
 use glam::Vec3;
 
-/// Rounds of moving cores apart and restoring lengths in a substep, at most: strands that meet at 5 m/s take twenty,
-/// those that meet at 8 m/s thirty, and most none.
+/// Rounds of moving cores apart and restoring lengths in a substep, at most: strands that meet at 5 m/s take twenty, and
+/// most none. With 24 of them 95 of 1,500 pass at 8 m/s, with 48 none.
 const ROUNDS: u32 = 48;
 
 /// So many rounds that have not left less than this share of the worst overlap show that it cannot be undone: single

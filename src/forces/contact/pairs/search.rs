@@ -121,7 +121,7 @@ impl Lists {
         regions.begin(&places[..nodes], strands, size);
         regions.differences(|node| [way(node); 2], differences);
         // Pairs grow with the square of the distance.
-        let mean = 2.0 * self.half_piece;
+        let mean = self.half_piece / HALF_PIECE;
         let most = (MOST_PAIRS / pairs.max(1e-3)).sqrt() * mean - *reach;
         let [least, last] = MARGINS.map(|margin| margin * *reach);
         let margin = |[differ, _]: &[f32; 2]| (LASTS * differ).min(most.max(*differ));

@@ -266,6 +266,44 @@ fn pairs_of_strands_that_meet_fast_are_found_before_they_meet() {
 }
 
 #[test]
+fn no_pair_is_left_out_where_some_strands_move_fast_and_others_rest() {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(9);
+    let mut strands = tangle(&mut random, 400, 8, 1.0);
+    for (k, strand) in strands.iter_mut().enumerate() {
+        // Many at rest in a wide room, and a few fast ones in a corner of it.
+        let fast = k < 12;
+        let at = Vec3::X * if fast { -0.5 } else { 0.002 * k as f32 };
+        for node in strand {
+            node.place += at;
+            node.velocity *= if fast { 2.0 } else { 0.0 };
+        }
+    }
+    let mut pairs = Pairs::default();
+    add_all(&mut pairs, &strands);
+    pairs.find(CONTACT);
+    let margins = pairs.lists.regions.of(0).iter().map(|cell| pairs.lists.margins[*cell as usize]);
+    let wide = margins.fold(0.0, f32::max);
+    let half_box = pairs.lists.half_box;
+    assert!(wide > half_box, "{wide} m is no more than a box of {half_box}");
+    let (mut listed, mut far) = (0, 0);
+    let nodes: Vec<PairNode> = strands.concat();
+    let edge = |n: usize| Edge { start: v3(nodes[n].place), end: v3(nodes[n + 1].place) };
+    let part = &pairs.parts[0];
+    for a in (0..96usize).filter(|a| a % 8 != 7) {
+        let own = part.starts[a] as usize..part.starts[a + 1] as usize;
+        for b in (a / 8 * 8 + 8..96).filter(|b| b % 8 != 7) {
+            let distance = see(edge(a), edge(b), 2e-3).distance;
+            let is_listed = part.seconds[own.clone()].contains(&(b as u32));
+            listed += usize::from(is_listed);
+            far += usize::from(is_listed && distance > 0.012);
+            let within = f64::from(CONTACT.reach + wide);
+            assert!(is_listed || distance > 0.999 * within, "{a} and {b}, {distance} m apart");
+        }
+    }
+    assert!(listed > 500 && far > 50, "{listed} {far}");
+}
+
+#[test]
 fn an_edge_has_no_more_pairs_than_it_may_and_the_nearest() {
     // Two thousand strands in one place: each edge has all edges of those after it.
     let strand = |k: i32| -> Strand {

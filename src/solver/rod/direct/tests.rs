@@ -245,8 +245,8 @@ impl Strands<Lane> {
         }
     }
 
-    /// Solves all lanes, at once or by halves. Whole blocks need registers of eight at least: with fewer the kernel is
-    /// never run on them, and takes a minute to compile.
+    /// Solves all lanes, at once or by halves. Whole blocks need registers of eight at least: with fewer the solver never
+    /// runs on them, and they would be the largest part of this program.
     fn solve_lanes(&mut self, twice: bool, halves: bool, step: &Step) -> Lane {
         let mut finite = [0.0; LANES];
         match twice {
