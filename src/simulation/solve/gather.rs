@@ -8,11 +8,14 @@
 use super::batched::{Batched, Kept, Member, Source};
 use crate::{
     base::lanes::{
-        LANES, put_numbers, put_vectors, put3, take_numbers, take_quaternions, take_vectors, take3,
-        take4,
+        LANES, put_numbers, put_vectors, put3, simd_level, take_numbers, take_quaternions,
+        take_vectors, take3, take4,
     },
     hair::strand::Strand,
-    solver::rod::block::{BlockLanes, NodeLanes},
+    solver::rod::{
+        block::{BlockLanes, NodeLanes},
+        limiter::strained,
+    },
 };
 use bevy::prelude::*;
 
@@ -72,7 +75,7 @@ pub(super) fn scatter<T: Batched>(
     let mut failed = 0;
     let kept = T::kept(params);
     let most_free = T::most_free_strain(params);
-    let strained = most_free.map_or(0, |most| strained(block, most));
+    let strained = most_free.map_or(0, |most| strained(simd_level(), block, most));
     for (group, four) in items.chunks_mut(4).enumerate() {
         let lanes = 4 * group..4 * group + four.len();
         let any_held = four.iter().any(|item| item.held.is_some());
@@ -103,22 +106,6 @@ pub(super) fn scatter<T: Batched>(
         }
     }
     failed
-}
-
-/// A bit for each lane of which an edge is stretched or crushed by more than this; but a tip that a solid meets end-on may
-/// be pressed for a substep or two, until it gives way sideways.
-fn strained(block: &BlockLanes, most: f32) -> u32 {
-    let high = (1.0 + most) * (1.0 + most);
-    let mut off = [0u32; LANES];
-    for (i, (ends, edge)) in block.nodes.windows(2).zip(&block.edges).enumerate() {
-        let low = if i + 2 < block.nodes.len() { (1.0 - most) * (1.0 - most) } else { 0.0 };
-        for (lane, off) in off.iter_mut().enumerate() {
-            let [x, y, z] = [0, 1, 2].map(|axis| ends[1].p[axis][lane] - ends[0].p[axis][lane]);
-            let (squared, l) = (x * x + y * y + z * z, edge.l[lane] * edge.l[lane]);
-            *off |= u32::from(squared < low * l) | u32::from(squared > high * l);
-        }
-    }
-    off.iter().zip(0..).map(|(off, lane)| off << lane).sum()
 }
 
 /// Whether a strand with held nodes does not take the substep, and stays where it was.

@@ -103,7 +103,7 @@ fn step_springs(
     springs: Settings<Springs>,
     contact: Settings<StrandContact>,
     gravity: Gravity,
-    hairs: Query<(Option<&Obstacles>, &TickPose)>,
+    hairs: Query<(Entity, Option<&Obstacles>, &TickPose)>,
     mut strands: Query<
         (
             Entity,
@@ -118,12 +118,16 @@ fn step_springs(
     mut faults: MessageWriter<HairFault>,
     scratch: Local<Scratch<SpringLanes>>,
 ) {
+    let is_spring = |hair| model.of(hair) == StrandModel::MassSpring;
+    if !substeps.any() || !hairs.iter().any(|(hair, ..)| is_spring(hair)) {
+        return;
+    }
     let gravity = gravity.clamped().0;
     let level = simd_level();
     let params_of = |hair: Entity| {
-        let (obstacles, pose) = hairs.get(hair).ok()?;
+        let (_, obstacles, pose) = hairs.get(hair).ok()?;
         let substep = substeps.of(hair)?;
-        (model.of(hair) == StrandModel::MassSpring).then(|| {
+        is_spring(hair).then(|| {
             let full = springs.of(hair);
             let iterations = substep.iterations(full.iterations);
             let step = SpringParams {

@@ -14,8 +14,8 @@ use super::{
     touch::TOUCHING,
     tridiagonal::{Elimination, back},
 };
-use crate::base::lanes::{LANES, Real, V3, load, load3};
-use fearless_simd::{Simd, f32x16, prelude::*};
+use crate::base::lanes::{LANES, Real, V3, dispatch, load, load3};
+use fearless_simd::{Level, Simd, f32x16, prelude::*};
 
 /// a: the share of a node's mobility that an obstacle removes along its normal. Below 1, so that a
 /// strand pressed straight down need not fold within one substep.
@@ -153,6 +153,29 @@ pub(super) fn worst_strain<S: Simd>(simd: S, b: &BlockLanes) -> f32x16<S> {
         worst = Real::max(worst, Real::max(off, -off) / l);
     }
     worst
+}
+
+/// A bit for each lane of which an edge is stretched or crushed by more than `most`; but a tip that a solid meets end-on
+/// may be pressed for a substep or two, until it gives way sideways.
+pub(crate) fn strained(level: Level, b: &BlockLanes, most: f32) -> u32 {
+    dispatch!(level, simd => strained_simd(simd, b, most))
+}
+
+#[inline(always)]
+fn strained_simd<S: Simd>(simd: S, b: &BlockLanes, most: f32) -> u32 {
+    let [high, low] = [1.0 + most, 1.0 - most].map(|bound| f32x16::splat(simd, bound * bound));
+    let mut off = 0;
+    let mut from = b.nodes[0].position(simd);
+    for (i, (to, edge)) in b.nodes[1..].iter().zip(&b.edges).enumerate() {
+        let (to, l) = (to.position(simd), load(simd, &edge.l));
+        let squared = (to - from).dot(to - from);
+        off |= Real::lt(l * l * high, squared).to_bitmask();
+        if i + 1 < b.edges.len() {
+            off |= Real::lt(squared, l * l * low).to_bitmask();
+        }
+        from = to;
+    }
+    off as u32
 }
 
 // Closures that are not inlined would be compiled without the instruction set of their caller, so
