@@ -21,6 +21,7 @@ mod worlds;
 #[cfg(feature = "gpu")]
 mod device;
 mod plots;
+mod replay;
 mod report;
 mod swing;
 mod trace;
@@ -53,6 +54,7 @@ enum Show {
     Worlds,
     Rods,
     Characters,
+    Replay,
 }
 
 impl FromStr for Show {
@@ -63,10 +65,11 @@ impl FromStr for Show {
             "worlds" => Ok(Self::Worlds),
             "rods" => Ok(Self::Rods),
             "characters" => Ok(Self::Characters),
+            "replay" => Ok(Self::Replay),
             _ => name
                 .parse()
                 .map(Self::Scene)
-                .map_err(|e: UnknownName| format!("{e}, swing, worlds, rods, characters")),
+                .map_err(|e: UnknownName| format!("{e}, swing, worlds, rods, characters, replay")),
         }
     }
 }
@@ -77,7 +80,7 @@ impl FromStr for Show {
 struct Arguments {
     /// Which scene: bedhead, blow-dry, perm, wet, shower; swing, a single strand; or, as figures against
     /// what they should be, worlds, what games do to a world, rods, strands against closed forms, and
-    /// characters, hair on glTF files.
+    /// characters, hair on glTF files; replay, a run of random inputs that is logged, or played back from its log.
     #[arg(long)]
     scene: Show,
     /// The files of `characters`; the project's own figure if left out.
@@ -118,6 +121,8 @@ struct Arguments {
     plots: Option<PathBuf>,
     #[command(flatten)]
     swing: swing::Options,
+    #[command(flatten)]
+    replay: replay::Options,
 }
 
 fn solver(name: &str) -> Result<SolverMethod, String> {
@@ -182,12 +187,16 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     if !arguments.files.is_empty() && arguments.scene != Show::Characters {
         return Err("FILE.glb is for --scene characters".into());
     }
+    if arguments.replay.any() && arguments.scene != Show::Replay {
+        return Err("--write and --read are for --scene replay".into());
+    }
     let kind = match arguments.scene {
         Show::Scene(kind) => kind,
         Show::Swing => return swing(arguments),
         Show::Worlds => return table(worlds::rows(), arguments.json),
         Show::Rods => return rods(arguments),
         Show::Characters => return characters(arguments),
+        Show::Replay => return arguments.replay.run(arguments.seconds, arguments.json),
     };
     if arguments.swing.any() {
         return Err(

@@ -210,7 +210,7 @@ pub fn tip_mean(world: &mut World) -> [f64; 3] {
 }
 
 /// FNV-1a over the bits of positions, velocities, orientations, bonds and water, in strand order.
-fn state_hash(strands: &[Strand], bonds: &[Bonds], water: &WaterLedger) -> u64 {
+pub fn state_hash(strands: &[Strand], bonds: &[Bonds], water: &WaterLedger) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut eat = |x: f32| hash = (hash ^ u64::from(x.to_bits())).wrapping_mul(0x0100_0000_01b3);
     for s in strands {

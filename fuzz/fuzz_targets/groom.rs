@@ -2,10 +2,15 @@
 //! written and read again.
 #![no_main]
 
-use bevy_keratin::authoring::groom::{Groom, GroomSettings, alembic, yuksel};
+use bevy_keratin::authoring::groom::{Groom, GroomCache, GroomSettings, alembic, yuksel};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|file: &[u8]| {
+    if let Ok((cache, _)) = GroomCache::from_file(file, &GroomSettings::default()) {
+        let archive = alembic::write_cache(&cache).expect("what was read can be written");
+        let strict = GroomSettings { keep_strays: true, ..GroomSettings::default() };
+        GroomCache::from_file(&archive, &strict).expect("what was written can be read");
+    }
     let Ok((groom, _)) = Groom::from_file(file, &GroomSettings::default()) else {
         return;
     };

@@ -11,9 +11,9 @@ pub mod wear;
 pub mod prelude {
     pub use crate::authoring::attach::RootsOnBones;
     pub use crate::authoring::groom::{
-        BonesFile, Groom, GroomError, GroomFileError, GroomGroup, GroomGuides, GroomLoss,
-        GroomLosses, GroomPlace, GroomSettings, GroomedHair, RootBones, RootEnd, StrandBones,
-        UpAxis,
+        BonesFile, Groom, GroomCache, GroomCacheError, GroomError, GroomFileError, GroomGroup,
+        GroomGuides, GroomLoss, GroomLosses, GroomPlace, GroomSettings, GroomedHair,
+        PlayGroomCache, RecordGroomCache, RootBones, RootEnd, StrandBones, UpAxis,
     };
     pub use crate::authoring::plant::{HairPreset, Hairline, Scalp};
     #[cfg(feature = "render")]

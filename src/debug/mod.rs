@@ -60,7 +60,7 @@ impl Owners<'_, '_> {
     fn of(&self, strand: &StrandOf, sleep: &StrandSleep) -> Owner {
         match self.hairs.get(strand.0).copied().unwrap_or_default() {
             MotionOwner::Gpu | MotionOwner::AsleepOnGpu => Owner::Gpu,
-            MotionOwner::Frozen => Owner::Frozen,
+            MotionOwner::Frozen | MotionOwner::Played => Owner::Frozen,
             MotionOwner::Settling => Owner::Settling,
             _ if sleep.is_follower() => Owner::Follower,
             _ if sleep.is_asleep() => Owner::Asleep,

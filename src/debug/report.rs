@@ -109,6 +109,8 @@ pub enum WhyMoved {
     AtRest,
     /// It is simulated ahead before it is first drawn, so many ticks so far.
     Settles(u32),
+    /// It plays a cache of a groom's motion (`PlayGroomCache`).
+    Played,
     /// Its head is scaled down to be hidden: [`HairInertia::hidden_scale`](crate::HairInertia::hidden_scale).
     Hidden,
     /// Its level of detail simulates no strand, because it is small on the screen.
@@ -129,6 +131,7 @@ impl fmt::Display for WhyMoved {
             Self::InWind => "moving air reaches it",
             Self::AtRest => "all of it has been still",
             Self::Settles(ticks) => return write!(f, "{ticks} ticks ahead so far"),
+            Self::Played => "a groom cache is played on it",
             Self::Hidden => "its head is scaled down to be hidden",
             Self::Small => "it is small on the screen",
             Self::OverBudget => "the HairBudget is spent",
@@ -248,6 +251,7 @@ impl HairReports<'_, '_> {
         }
         report.why = match owner {
             _ if report.strands == 0 => WhyMoved::NoStrands,
+            MotionOwner::Played => WhyMoved::Played,
             MotionOwner::Settling => WhyMoved::Settles(settling.map_or(0, |of| of.done)),
             MotionOwner::Frozen if pose.waits() => WhyMoved::Hidden,
             MotionOwner::Frozen if lod.is_some_and(PresentLod::wants_simulation) => {

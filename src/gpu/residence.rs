@@ -111,6 +111,8 @@ pub enum Unsupported {
     LevelOfDetail,
     /// It is still [`Settling`](crate::Settling).
     Settling,
+    /// It is recorded (`RecordGroomCache`), or plays what was (`PlayGroomCache`).
+    GroomCache,
     /// Its [`HairStyle`](crate::HairStyle) is watched.
     WatchedStyle,
     /// Strands that are stiffer or softer than others ([`StrandStiffness`](crate::StrandStiffness)).
@@ -167,6 +169,7 @@ impl fmt::Display for Unsupported {
             Self::MovingRoots => "its roots are being tied to a mesh",
             Self::LevelOfDetail => "at its level of detail other strands are simulated, or none",
             Self::Settling => "it is still settling",
+            Self::GroomCache => "it is recorded, or plays a groom cache",
             Self::WatchedStyle => "its style is watched",
             Self::StrandStiffness => "strands of their own stiffness are not supported there",
             Self::WindReceived => "the wind that it receives is counted",

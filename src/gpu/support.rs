@@ -14,7 +14,8 @@ use crate::{
         environment::{WindReceived, Winds},
     },
     hair::strand::{
-        Hair, HeldNodes, HeldNodesState, OnGpu, Strand, StrandModel, StrandOf, Strands, TickPose,
+        Hair, HeldNodes, HeldNodesState, OnGpu, PlayedHair, RecordedHair, Strand, StrandModel,
+        StrandOf, Strands, TickPose,
     },
     hairdo::{
         style::HairStyle,
@@ -78,6 +79,7 @@ pub(super) struct Support<'w, 's> {
     rods: Query<'w, 's, (), With<PermRod>>,
     counted: Query<'w, 's, &'static StrandOf, With<WindReceived>>,
     stiff: Query<'w, 's, (&'static StrandOf, &'static StrandStiffness)>,
+    cached: Query<'w, 's, (), Or<(With<PlayedHair>, With<RecordedHair>)>>,
     disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
     #[cfg(feature = "groom")]
     on_mesh: Query<'w, 's, (Ref<'static, RootsOnMesh>, &'static TiedRoots)>,
@@ -159,6 +161,7 @@ impl Support<'_, '_> {
             (unplaced.is_some(), Unsupported::ColliderShape),
             (is_being_tied, Unsupported::MovingRoots),
             (settles, Unsupported::Settling),
+            (self.cached.contains(hair), Unsupported::GroomCache),
             (is_watched, Unsupported::WatchedStyle),
             (treatments.is_some_and(GpuTreatments::are_too_many), Unsupported::Treatments),
             // The last: where nothing else is missing the budget lets go of it.

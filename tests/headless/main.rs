@@ -90,6 +90,7 @@ mod second_day;
 mod settle;
 mod shade;
 mod sleep;
+mod soak;
 mod stiffness;
 mod style;
 mod submersion;

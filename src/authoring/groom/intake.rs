@@ -10,6 +10,8 @@ pub(super) struct Intake {
     pub groom: Groom,
     numbers: Vec<u32>,
     all: usize,
+    /// The numbers of strands that were stored from tip to root.
+    pub(super) turned: Vec<usize>,
     pub losses: GroomLosses,
 }
 
@@ -22,7 +24,7 @@ impl Intake {
 
     fn new(groom: Groom, losses: GroomLosses) -> Self {
         let all = groom.len();
-        Self { numbers: (0..all as u32).collect(), all, groom, losses }
+        Self { numbers: (0..all as u32).collect(), all, turned: Vec::new(), groom, losses }
     }
 
     /// A groom as a file has it, whose numbers may be any: without strands of a single node or with a broken
@@ -92,6 +94,12 @@ impl Intake {
             self.numbers = strands.iter().map(|i| self.numbers[*i]).collect();
             self.groom = self.groom.picked(strands);
         }
+    }
+
+    /// The strands of another groom of as many strands as the file has that are kept here, root first.
+    pub fn same_of(&self, mut all: Groom) -> Groom {
+        self.turned.iter().for_each(|i| all.turn_strand(*i));
+        all.picked(self.numbers.iter().map(|i| *i as usize))
     }
 
     /// How many strands the file has.

@@ -1,9 +1,9 @@
 //! Grooms as assets.
 
 use super::{
-    BonesFile, Groom, GroomError, GroomFileError, GroomFormat, GroomGroup, GroomLoss, GroomLosses,
-    GroomPlace, GroomSettings, OddSize, RootBones, RootEnd, StrandBones, alembic, gltf, grown_hair,
-    intake::Intake, ply, salon, tressfx, yuksel,
+    BonesFile, Groom, GroomCacheLoader, GroomError, GroomFileError, GroomFormat, GroomGroup,
+    GroomLoss, GroomLosses, GroomPlace, GroomSettings, OddSize, RootBones, RootEnd, StrandBones,
+    alembic, cache, gltf, grown_hair, intake::Intake, ply, salon, tressfx, yuksel,
 };
 use bevy::{
     asset::{
@@ -228,6 +228,7 @@ impl Plugin for GroomPlugin {
             .register_type::<GroomGroup>()
             .register_type::<OddSize>();
         grown_hair::build(app);
+        cache::build(app);
         add_loader(app);
     }
 
@@ -241,6 +242,8 @@ fn add_loader(app: &mut App) {
     let world = app.world();
     if world.contains_resource::<AssetServer>() && !world.contains_resource::<Assets<Groom>>() {
         app.init_asset::<Groom>().register_asset_loader(GroomLoader);
+        cache::with_assets(app);
+        app.register_asset_loader(GroomCacheLoader);
         grown_hair::with_assets(app);
     }
 }

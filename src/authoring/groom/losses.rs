@@ -141,7 +141,7 @@ losses! {
     /// Curve sets without any curve.
     empty_curves: "empty curve sets left out", false;
     /// Samples of animated curves after the first.
-    unread_samples: "samples of animated curves after the first not read", false;
+    unread_samples: "samples of animated curves after the first not read (a GroomCache has them)", false;
     /// Closed lines opened at their first node.
     opened_loops: "closed lines opened", false;
     /// Nodes where a line branched and was split.

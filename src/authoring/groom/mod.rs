@@ -6,6 +6,8 @@
 pub mod alembic;
 mod bones;
 mod bytes;
+mod cache;
+mod cache_file;
 #[cfg(feature = "render")]
 mod drawn;
 mod foreign;
@@ -29,6 +31,8 @@ pub mod yuksel;
 
 pub use bones::{BonesFile, RootBones, StrandBones};
 pub use bytes::GroomFileError;
+pub use cache::{GroomCache, GroomCacheError, PlayGroomCache, RecordGroomCache};
+pub use cache_file::GroomCacheLoader;
 pub use format::{GroomFormat, UpAxis};
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::{GroomLoss, GroomLosses, GroomPlace};

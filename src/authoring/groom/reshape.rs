@@ -213,7 +213,7 @@ impl Groom {
 }
 
 /// Lengths from the root up to each node, and up to the tip.
-fn arc_lengths(points: &[Vec3], along: &mut Vec<f64>) -> f64 {
+pub(super) fn arc_lengths(points: &[Vec3], along: &mut Vec<f64>) -> f64 {
     let mut length = 0.0;
     along.clear();
     along.push(0.0);
@@ -225,7 +225,7 @@ fn arc_lengths(points: &[Vec3], along: &mut Vec<f64>) -> f64 {
 }
 
 /// The segment at a distance along a strand, and the parameter within it.
-fn place(along: &[f64], distance: f64) -> (usize, f32) {
+pub(super) fn place(along: &[f64], distance: f64) -> (usize, f32) {
     let after = along.partition_point(|a| *a <= distance).clamp(1, along.len() - 1);
     let (from, to) = (along[after - 1], along[after]);
     let share = if to > from { ((distance - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };

@@ -55,14 +55,22 @@ impl Intake {
         for &i in &turned {
             let number = self.number(i);
             self.losses.turned_strands.add(GroomPlace::Strand(number));
-            let nodes = self.groom.nodes_of(i);
-            self.groom.points[nodes.clone()].reverse();
-            if let Some(widths) = self.groom.widths.get_mut(nodes.clone()) {
-                widths.reverse();
-            }
-            if let Some(colors) = self.groom.colors.get_mut(nodes) {
-                colors.reverse();
-            }
+            self.turned.push(number);
+            self.groom.turn_strand(i);
+        }
+    }
+}
+
+impl Groom {
+    /// The strand from its other end.
+    pub(super) fn turn_strand(&mut self, strand: usize) {
+        let nodes = self.nodes_of(strand);
+        self.points[nodes.clone()].reverse();
+        if let Some(widths) = self.widths.get_mut(nodes.clone()) {
+            widths.reverse();
+        }
+        if let Some(colors) = self.colors.get_mut(nodes) {
+            colors.reverse();
         }
     }
 }

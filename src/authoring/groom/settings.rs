@@ -94,6 +94,21 @@ impl GroomSettings {
         mut intake: Intake,
         format: GroomFormat,
     ) -> Result<(Groom, GroomLosses), GroomError> {
+        self.choose(&mut intake)?;
+        let mut groom = self.place(core::mem::take(&mut intake.groom), format)?;
+        if !groom.is_merged(self.shortest_segment) {
+            let (merged, losses) = groom.merged(self.shortest_segment)?;
+            intake.add(losses);
+            groom = merged;
+        }
+        if groom.is_empty() {
+            return Err(GroomError::AllLeftOut { losses: intake.losses.to_string() });
+        }
+        Ok((self.resample(groom)?, intake.losses))
+    }
+
+    /// Leaves out strays and strands that are not asked for, and finds roots.
+    pub(super) fn choose(&self, intake: &mut Intake) -> Result<(), GroomError> {
         self.clone().checked()?;
         if !self.keep_strays {
             intake.leave_out_strays();
@@ -106,23 +121,17 @@ impl GroomSettings {
         let limit = self.limit.unwrap_or(usize::MAX);
         intake.keep(evenly((0..all).step_by(self.keep_every).collect(), limit));
         intake.losses.thinned_strands.count += all - intake.groom.len();
-        let groom = core::mem::take(&mut intake.groom);
-        let mut groom = groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?;
-        if self.origin != Vec3::ZERO {
-            groom = groom.moved(-self.origin)?;
-        }
-        if !groom.is_merged(self.shortest_segment) {
-            let (merged, losses) = groom.merged(self.shortest_segment)?;
-            intake.add(losses);
-            groom = merged;
-        }
-        if groom.is_empty() {
-            return Err(GroomError::AllLeftOut { losses: intake.losses.to_string() });
-        }
-        if let Some(nodes) = self.nodes {
-            groom = groom.resampled(nodes)?;
-        }
-        Ok((groom, intake.losses))
+        Ok(())
+    }
+
+    /// Brings a groom of a file of this format to metres, Y up, and its origin.
+    pub(super) fn place(&self, groom: Groom, format: GroomFormat) -> Result<Groom, GroomError> {
+        let groom = groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?;
+        if self.origin == Vec3::ZERO { Ok(groom) } else { groom.moved(-self.origin) }
+    }
+
+    pub(super) fn resample(&self, groom: Groom) -> Result<Groom, GroomError> {
+        self.nodes.map_or(Ok(groom.clone()), |nodes| groom.resampled(nodes))
     }
 
     /// Metres per unit of a file of this format.

@@ -535,6 +535,14 @@ impl TickPose {
         self.motion().velocity[0]
     }
 
+    /// How a point that is fixed to it moves in this tick, in the frame and units of its hair, as far as motion acts on that.
+    pub(crate) fn motion_at(&self, place: Vec3) -> Vec3 {
+        let PoseMotion { velocity, spin } = self.motion();
+        let own = |v: Vec3| self.now.rotation.inverse() * v;
+        own(velocity[0]) * self.inertia.x / self.now.scale
+            + (own(spin[0]) * self.inertia.y).cross(place)
+    }
+
     /// Its angular velocity in this tick, in the world (rad/s); jumps left out.
     pub fn spin(&self) -> Vec3 {
         self.motion().spin[0]

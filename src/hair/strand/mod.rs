@@ -36,6 +36,7 @@ pub use on_gpu::OnGpu;
 pub(crate) use on_gpu::{AskForStrands, ReturnToCpu, StrandsArrived};
 pub(crate) use on_gpu::{MissedOnGpu, return_to_cpu};
 pub use owner::{MotionOwner, Settling};
+pub(crate) use owner::{PlayedHair, RecordedHair};
 #[cfg(feature = "gpu")]
 pub(crate) use owner_systems::HairOnGpu;
 #[cfg(feature = "save")]
@@ -429,6 +430,23 @@ impl Strand {
             *tip = p;
         }
         self.rest();
+    }
+
+    /// Puts each node at a place (m) with a velocity (m/s); edges turn the shortest way.
+    #[cfg(feature = "groom")]
+    pub(crate) fn put_nodes(&mut self, node: impl Fn(usize) -> (Vec3, Vec3)) {
+        self.rest();
+        self.root_before = None;
+        for (i, (place, velocity)) in
+            self.positions.iter_mut().zip(&mut self.velocities).enumerate()
+        {
+            (*place, *velocity) = node(i);
+        }
+        for (ends, q) in self.positions.windows(2).zip(&mut self.orientations) {
+            if let Some(along) = (ends[1] - ends[0]).try_normalize() {
+                *q = (Quat::from_rotation_arc((*q * Vec3::Z).normalize(), along) * *q).normalize();
+            }
+        }
     }
 
     /// Moves the root, with the scalp's frame.

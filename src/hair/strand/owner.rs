@@ -10,6 +10,7 @@ use bevy::prelude::*;
 /// | [`Simulated`](Self::Simulated) | by the tick, here | by default | | everything |
 /// | [`Settling`](Self::Settling) | by the tick, and by more ticks ahead ([`SettleTick`](crate::SettleTick)) | [`Settling`] is inserted | it is at rest, and [`Settling`] is removed | everything in the tick; ahead of it no bonds, water and treatments. It is not drawn, and at each level of detail all its strands are simulated |
 /// | [`Frozen`](Self::Frozen) | not at all: they keep their shape on the head | a level without simulated strands ([`LodLevel::strands`](crate::LodLevel::strands)) | another level | bonds, water and treatments |
+/// | [`Played`](Self::Played) | by a recorded or animated groom (`PlayGroomCache`, feature `groom`) | it is loaded | the component is removed | nothing: bonds, water and treatments wait |
 /// | [`Asleep`](Self::Asleep) | not at all: all its strands sleep ([`SleepSettings`](crate::SleepSettings)) | the last of them falls asleep | one wakes | what wakes it; treatments and water |
 /// | [`Gpu`](Self::Gpu) | by compute shaders | it is handed over | it has come back | what a shader knows of; no system here touches its strands |
 /// | [`AsleepOnGpu`](Self::AsleepOnGpu) | not at all, on the GPU | the GPU reports that all are still | something disturbs it | what wakes it |
@@ -26,6 +27,8 @@ pub enum MotionOwner {
     Settling,
     /// Nobody: its level of detail simulates no strand.
     Frozen,
+    /// A cache of a groom's motion.
+    Played,
     /// Nobody: all its strands sleep.
     Asleep,
     /// Compute shaders.
@@ -37,7 +40,7 @@ pub enum MotionOwner {
 impl MotionOwner {
     /// Whether its strands change their shape or place in this tick.
     pub fn moves(self) -> bool {
-        matches!(self, Self::Simulated | Self::Settling | Self::Gpu)
+        matches!(self, Self::Simulated | Self::Settling | Self::Played | Self::Gpu)
     }
 
     /// Whether all its strands sleep.
@@ -73,3 +76,15 @@ pub struct Settling {
     /// For how long it has been still (s).
     pub still: f32,
 }
+
+/// Marks a hair that something else moves in place of the tick, strand by strand: it is left alone, but for levels of detail.
+#[derive(Component, Clone, Copy, Debug, Default)]
+#[component(clone_behavior = Ignore)]
+#[cfg_attr(not(feature = "groom"), allow(dead_code))]
+pub(crate) struct PlayedHair;
+
+/// Marks a hair whose strands something reads in each tick: it stays here.
+#[derive(Component, Clone, Copy, Debug, Default)]
+#[component(clone_behavior = Ignore)]
+#[cfg_attr(not(feature = "groom"), allow(dead_code))]
+pub(crate) struct RecordedHair;

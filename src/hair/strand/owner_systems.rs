@@ -1,6 +1,8 @@
 //! Who moves a hair is decided here, but for hair that the GPU takes or returns, and asked for by these filters.
 
-use super::{Hair, KinematicStrand, MotionOwner, OnGpu, Settling, SleepCounts, Strands, TickPose};
+use super::{
+    Hair, KinematicStrand, MotionOwner, OnGpu, PlayedHair, Settling, SleepCounts, Strands, TickPose,
+};
 use bevy::prelude::*;
 
 /// Filters of hair whose state is here, and of hair whose state is on the GPU.
@@ -26,7 +28,7 @@ pub(crate) fn is_on_gpu(world: &World, hair: Entity) -> bool {
 /// What decides who moves a hair.
 type Facts = (
     &'static mut MotionOwner,
-    Has<OnGpu>,
+    (Has<OnGpu>, Has<PlayedHair>),
     Has<Settling>,
     Option<&'static SleepCounts>,
     Option<&'static Strands>,
@@ -35,12 +37,13 @@ type Facts = (
 
 /// Once a tick, after sleep has been decided.
 pub(super) fn update_owners(mut hairs: Query<Facts, With<Hair>>) {
-    for (mut owner, on_gpu, settles, sleepers, members, pose) in &mut hairs {
+    for (mut owner, (on_gpu, is_played), settles, sleepers, members, pose) in &mut hairs {
         let rests = pose.waits() || sleepers.is_some_and(|s| s.awake == 0 && members.is_some());
         let sleeps = sleepers.is_some_and(SleepCounts::all);
         owner.set_if_neq(match (on_gpu, settles) {
             (true, _) if sleeps => MotionOwner::AsleepOnGpu,
             (true, _) => MotionOwner::Gpu,
+            _ if is_played => MotionOwner::Played,
             (_, true) => MotionOwner::Settling,
             _ if sleeps => MotionOwner::Asleep,
             _ if rests => MotionOwner::Frozen,

@@ -89,7 +89,7 @@ fn cut_all(world: &mut World, request: &CutHair) {
         let mut answer = HairCut { hair, by, region, strands: 0, refused: 0, length: 0.0 };
         let mut drained = 0.0;
         for member in members {
-            let mut strand = world.entity_mut(member);
+            let Ok(mut strand) = world.get_entity_mut(member) else { continue };
             let Some(own) = strand.get::<Strand>() else { continue };
             if !own.positions().first().is_some_and(|root| region.contains(*root)) {
                 continue;

@@ -19,8 +19,9 @@ use crate::{
     },
     hair::{
         strand::{
-            AddedMass, Hair, HairHere, HeldNodes, Pose, Regroomed, SimulatedHere, SleepCounts,
-            SleepPose, Strand, StrandModel, StrandOf, StrandSleep, TickPose, lacks_strands,
+            AddedMass, Hair, HairHere, HeldNodes, PlayedHair, Pose, Regroomed, SimulatedHere,
+            SleepCounts, SleepPose, Strand, StrandModel, StrandOf, StrandSleep, TickPose,
+            lacks_strands,
         },
         worn,
     },
@@ -281,7 +282,7 @@ fn update_sleep(
             &TickPose,
             &mut SleepSnapshot,
             &mut SleepCounts,
-            &Regroomed,
+            (&Regroomed, Has<PlayedHair>),
             (Option<&HairReach>, Option<&Obstacles>),
         ),
         HairHere,
@@ -302,7 +303,9 @@ fn update_sleep(
     let mut wake_events: Vec<WakeEvents> = Vec::new();
     let mut index_of = EntityHashMap::<usize>::default();
     let mut scratch = Vec::new();
-    for (hair, frame, mut snapshot, sleepers, regroomed, (reach, obstacles)) in &mut hairs {
+    for (hair, frame, mut snapshot, sleepers, (regroomed, is_played), (reach, obstacles)) in
+        &mut hairs
+    {
         index_of.insert(hair, wake_events.len());
         let snapshot = snapshot.bypass_change_detection();
         // Hair without simulated strands has none to wake; the first that it gets are awake.
@@ -317,6 +320,7 @@ fn update_sleep(
         let is_regroomed = regroomed.members;
         let mut new =
             snapshot.wake_events(settings.of(hair), frame.now(), is_regroomed, seen, step.count);
+        new.all_wake |= is_played;
         new.winds = winds.seen_from(frame);
         let hiding = near.iter().filter(|of| obstacles.is_some_and(|all| all.are_under(of.id)));
         new.hats.extend(hiding.filter_map(|of| {

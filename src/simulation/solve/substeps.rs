@@ -5,7 +5,7 @@ use crate::{
         schedule::{HairStep, HairSystems, HairTick, MergedSubsteps, first_substep},
         setting::Settings,
     },
-    hair::strand::{Hair, StrandModel, TickPose},
+    hair::strand::{Hair, PlayedHair, StrandModel, TickPose},
     solver::rod::{HairSolver, SolverMethod},
 };
 use bevy::prelude::*;
@@ -22,10 +22,10 @@ fn choose_substeps(
     step: Res<HairStep>,
     solver: Settings<HairSolver>,
     model: Settings<StrandModel>,
-    mut hairs: Query<(Entity, &TickPose, &mut MergedSubsteps), With<Hair>>,
+    mut hairs: Query<(Entity, &TickPose, Has<PlayedHair>, &mut MergedSubsteps), With<Hair>>,
 ) {
-    for (hair, pose, mut merged) in &mut hairs {
-        if pose.waits() {
+    for (hair, pose, is_played, mut merged) in &mut hairs {
+        if pose.waits() || is_played {
             merged.set_if_neq(MergedSubsteps::WAITS);
             continue;
         }

@@ -1,7 +1,7 @@
 //! What inspectors, scene files and careless game code may do to a world with hair: no panic, no
 //! strand that stays non-finite.
 //!
-//! `cargo test --release --test attack -- --ignored` goes on for a million operations.
+//! `cargo test --release --test headless attack -- --ignored` goes on for a million operations.
 
 mod operations;
 
@@ -637,13 +637,14 @@ fn a_world_that_anything_is_done_to_goes_on() {
 #[test]
 #[ignore = "takes minutes: a million operations"]
 fn a_world_that_anything_is_done_to_goes_on_for_long() {
-    // SEED is where to go on, SEEDS how many.
-    let [first, count] = [("SEED", 100), ("SEEDS", 20)].map(|(name, usual)| {
+    // SEED is where to go on, SEEDS how many, OPERATIONS of each.
+    let usual = [("SEED", 100), ("SEEDS", 20), ("OPERATIONS", 50_000)];
+    let [first, count, operations] = usual.map(|(name, usual)| {
         std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(usual)
     });
     for seed in first..first + count {
         let begun = std::time::Instant::now();
-        attack(seed, 50_000);
-        println!("seed {seed}: 50,000 operations in {:.0} s", begun.elapsed().as_secs_f32());
+        attack(seed as u64, operations);
+        println!("seed {seed}: {operations} operations in {:.0} s", begun.elapsed().as_secs_f32());
     }
 }

@@ -6,13 +6,14 @@ use bevy::{
         query::QueryFilter,
         reflect::{AppTypeRegistry, ReflectComponent, ReflectResource},
         resource::IsResource,
+        system::SystemState,
     },
     prelude::*,
     reflect::{PartialReflect, ReflectMut, ReflectRef, std_traits::ReflectDefault},
 };
 use bevy_keratin::{
-    AddedMass, BondChanges, HairLod, HairSubsteps, Shower, SleepSettings, SoakHair, SolverMethod,
-    WindReceived, WindZone,
+    AddedMass, BondChanges, ContactMethod, HairLod, HairSnapshot, HairSnapshots, HairSubsteps,
+    Shower, SleepSettings, SoakHair, SolverMethod, WindReceived, WindZone,
     authoring::attach::TiedRoots,
     forces::{
         contact::{LockNeighbours, Obstacles},
@@ -331,7 +332,7 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             (0..=segments).map(|i| place * 0.1 + Vec3::X * 0.02 * i as f32).collect();
         Strand::from_polyline(&points).unwrap()
     };
-    match (random.random_range(0..58), hair, one, any) {
+    match (random.random_range(0..66), hair, one, any) {
         (0, Some(hair), ..) if strands.len() < 40 => {
             let segments = random.random_range(1..20);
             world.spawn((StrandOf(hair), line(segments)));
@@ -592,6 +593,62 @@ pub fn one(app: &mut App, random: &mut Random) -> String {
             format!("showers that owe {wrong}")
         }
         (48, _, _, Some(entity)) => insert_any(world, entity, random),
+        (49, Some(hair), ..) => {
+            let length = [0.05, 0.1, wrong][random.random_range(0..3)];
+            let by = match random.random() {
+                true => CutBy::Length(length),
+                false => CutBy::Plane { point: place, normal: Vec3::X * length },
+            };
+            world.trigger(CutHair::all(hair, by));
+            format!("cut {by:?}")
+        }
+        (50, Some(hair), ..) => {
+            let tie = HairTie { radius: wrong, seconds: wrong.abs() };
+            let tie = world.spawn((tie, Transform::from_translation(place), ChildOf(hair))).id();
+            let normal = Vec3::Y * wrong;
+            let region = [StrandRegion::All, StrandRegion::Above { point: place, normal }];
+            let region = region[random.random_range(0..2)];
+            world.trigger(TieHair { hair, tie, region });
+            format!("tied with {wrong}, {region:?}")
+        }
+        (51, ..) => {
+            let mut ties = world.query_filtered::<Entity, With<HairTie>>();
+            let tie = ties.iter(world).next();
+            if let Some(tie) = tie {
+                world.despawn(tie);
+            }
+            "a tie gone".into()
+        }
+        (52, Some(hair), ..) => {
+            let methods = [ContactMethod::Printed, ContactMethod::Mutual, ContactMethod::Pairs];
+            let method = methods[random.random_range(0..3)];
+            let radius = [1e-3, 5e-3, wrong][random.random_range(0..3)];
+            world.entity_mut(hair).insert(StrandContact { method, radius, ..default() });
+            format!("contact by {method:?} at {radius}")
+        }
+        (53, Some(hair), ..) => {
+            let other = *hairs.choose(random).unwrap();
+            let mut state = SystemState::<HairSnapshots>::new(world);
+            let mut snapshots = state.get_mut(world).unwrap();
+            let mut taken = HairSnapshot::default();
+            let done = snapshots.take(other, &mut taken);
+            // Bytes of another machine, one of them broken.
+            let mut bytes = taken.to_bytes();
+            if random.random() && !bytes.is_empty() {
+                let at = random.random_range(0..bytes.len());
+                bytes[at] ^= 1 << random.random_range(0..8);
+            }
+            let done = done.and_then(|()| HairSnapshot::from_bytes(&bytes));
+            format!("rolled back: {:?}", done.and_then(|taken| snapshots.restore(hair, &taken)))
+        }
+        (54, Some(hair), ..) => {
+            world.entity_mut(hair).insert(RecordGroomCache::default());
+            "recorded".into()
+        }
+        (55, Some(hair), ..) => {
+            let frames = GroomCache::of_recording(world, hair).map(|cache| cache.len());
+            format!("recorded frames: {frames:?}")
+        }
         (_, _, _, Some(entity)) => write(world, entity, true, random),
         _ => "nothing".into(),
     }

@@ -1,5 +1,6 @@
 //! Grooms: files read and written, malformed ones refused, strands reshaped and worn.
 
+mod cache;
 #[cfg(feature = "render")]
 mod drawn;
 mod files;

@@ -2,8 +2,8 @@
 //! export it.
 //!
 //! The container is Ogawa; archives of before 2013 are HDF5 and not read. All curve sets of a file become one
-//! groom, in the order of the file and with the transforms above them applied; the first sample of what is
-//! animated counts. The format specifies neither unit nor axes: see
+//! groom, in the order of the file and with the transforms above them applied. Of what is animated a [`Groom`] has the first
+//! sample, and a [`GroomCache`](super::GroomCache) all. The format specifies neither unit nor axes: see
 //! [`GroomSettings`](super::GroomSettings).
 //!
 //! | curves | become |
@@ -34,7 +34,7 @@ mod params;
 mod tests;
 mod write;
 
-pub use write::write;
+pub use write::{write, write_cache};
 
 use super::{
     Groom, GroomError, GroomFileError, GroomLosses, bytes::value, intake::Intake,
@@ -79,25 +79,8 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
 
 pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     let archive = Ogawa::open(file)?;
-    let mut reading = Reading {
-        archive: &archive,
-        limit: file.len() / BYTES_PER_NODE,
-        groom: Groom::default(),
-        widths: Column::EMPTY,
-        colors: Column::EMPTY,
-        uvs: Column::EMPTY,
-        guides: Column::EMPTY,
-        stiffness: Column::EMPTY,
-        groups: Groups::default(),
-        losses: GroomLosses::default(),
-    };
-    reading.walk()?;
+    let reading = Reading::of(&archive, Read::All)?;
     let Reading { mut groom, widths, colors, uvs, guides, stiffness, groups, losses, .. } = reading;
-    if groom.is_empty() {
-        let hint = "export hair curves or particle hair with it, visible";
-        let found = format!("without curves ({losses})");
-        return value(8, "the archive", found, "one with AbcGeom_Curve", hint);
-    }
     groom.widths = widths.filled(None).into_iter().map(|[width]| width).collect();
     groom.colors = colors.filled(None).into_iter().map(LinearRgba::from_f32_array).collect();
     groom.uvs = uvs.filled(Some([0.0; 2])).into_iter().map(Vec2::from_array).collect();
@@ -107,6 +90,43 @@ pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     }
     groom.guides = guides.filled(Some([0.0])).into_iter().map(|[guide]| guide != 0.0).collect();
     Ok(Intake::cleaned(groom, losses)?)
+}
+
+/// The nodes of all curves of a file at the times of its samples (s), whatever numbers they are.
+pub(super) struct Motion<'a> {
+    archive: Ogawa<'a>,
+    moments: Moments,
+}
+
+/// When nodes move.
+#[derive(Clone, Copy)]
+struct Moments {
+    count: u64,
+    /// By their [kind](Property::times).
+    times: u64,
+}
+
+impl<'a> Motion<'a> {
+    pub(super) fn of(file: &'a [u8]) -> Result<Self, GroomFileError> {
+        let archive = Ogawa::open(file)?;
+        let moments = Reading::of(&archive, Read::Nodes)?.moments;
+        Ok(Self { archive, moments })
+    }
+
+    pub(super) fn frames(&self) -> u64 {
+        self.moments.count
+    }
+
+    /// Of a frame the time, and the groom without anything but nodes.
+    pub(super) fn frame(&mut self, frame: u64) -> Result<(f64, Groom), GroomFileError> {
+        self.archive.sample = frame;
+        self.archive.look_again();
+        let time = match self.moments.count {
+            1 => 0.0,
+            _ => self.archive.time(self.moments.times, frame)?,
+        };
+        Ok((time, Reading::of(&self.archive, Read::Nodes)?.groom))
+    }
 }
 
 /// An object that others are in.
@@ -129,6 +149,16 @@ struct Reading<'a> {
     stiffness: Column<1>,
     groups: Groups,
     losses: GroomLosses,
+    /// Of what has the most samples of all that moves nodes.
+    moments: Moments,
+    read: Read,
+}
+
+/// How much of curves is read.
+#[derive(Clone, Copy, PartialEq)]
+enum Read {
+    All,
+    Nodes,
 }
 
 fn path_of(open: &[Open<'_>], object: Object<'_>) -> String {
@@ -138,6 +168,37 @@ fn path_of(open: &[Open<'_>], object: Object<'_>) -> String {
 }
 
 impl<'a> Reading<'a> {
+    fn of(archive: &'a Ogawa<'a>, read: Read) -> Result<Self, GroomFileError> {
+        let mut reading = Self {
+            archive,
+            limit: archive.len() / BYTES_PER_NODE,
+            groom: Groom::default(),
+            widths: Column::EMPTY,
+            colors: Column::EMPTY,
+            uvs: Column::EMPTY,
+            guides: Column::EMPTY,
+            stiffness: Column::EMPTY,
+            groups: Groups::default(),
+            losses: GroomLosses::default(),
+            moments: Moments { count: 1, times: 0 },
+            read,
+        };
+        reading.walk()?;
+        if reading.groom.is_empty() {
+            let hint = "export hair curves or particle hair with it, visible";
+            let found = format!("without curves ({})", reading.losses);
+            return value(8, "the archive", found, "one with AbcGeom_Curve", hint);
+        }
+        Ok(reading)
+    }
+
+    /// Notes what moves nodes.
+    fn moves(&mut self, property: Property<'a>) {
+        if property.moments() > self.moments.count {
+            self.moments = Moments { count: property.moments(), times: property.times };
+        }
+    }
+
     fn walk(&mut self) -> Result<(), GroomFileError> {
         let archive = self.archive;
         let top = archive.top();
@@ -184,10 +245,13 @@ impl<'a> Reading<'a> {
 
     /// The space of a transform's children. Operations are listed outermost first.
     fn transform(
-        &self,
+        &mut self,
         properties: Compound<'a>,
         above: DAffine3,
     ) -> Result<DAffine3, GroomFileError> {
+        if let Some(moving) = self.archive.find(properties, ".vals")? {
+            self.moves(moving);
+        }
         let find = |name| self.archive.find_values(properties, name);
         let inherits = find(".inherits")?.is_none_or(|inherits| inherits.get(0) != 0.0);
         let mut space = if inherits { above } else { DAffine3::IDENTITY };
@@ -248,6 +312,7 @@ impl<'a> Reading<'a> {
         };
         let (kind, is_closed) = kind_of(archive.find_values(set, "curveBasisAndType")?, path)?;
         let curves = self.curves_of(kind, points, counts, path)?;
+        self.moves(positions);
         if let Some(more @ 1..) = positions.samples.checked_sub(1) {
             self.losses.unread_samples.add_many(more as usize, place());
         }
@@ -255,7 +320,10 @@ impl<'a> Reading<'a> {
             self.losses.opened_loops.add_many(curves.len(), place());
         }
         self.nodes(set, points, curves, (space, path))?;
-        self.numbers(set, curves, (space, path))
+        match self.read {
+            Read::All => self.numbers(set, curves, (space, path)),
+            Read::Nodes => Ok(()),
+        }
     }
 
     /// The curves of a set, whose counts fit its points.

@@ -33,6 +33,10 @@ pub struct Ogawa<'a> {
     metadata: Vec<&'a str>,
     /// Position of the object at the top.
     top: u64,
+    /// When samples are.
+    times: u64,
+    /// Which sample of what changes in time is read.
+    pub sample: u64,
     looks_left: Cell<u64>,
 }
 
@@ -105,11 +109,30 @@ pub struct Property<'a> {
     pub name: &'a str,
     /// How many values there are in time.
     pub samples: u64,
+    /// The first that differs from the one before, and the last.
+    changes: [u64; 2],
+    /// Which times these have.
+    pub times: u64,
     info: u64,
     at: u64,
 }
 
 impl Property<'_> {
+    /// How many values there are in time that may differ: others are stored once.
+    pub fn moments(&self) -> u64 {
+        if self.changes[1] == 0 { self.samples.min(1) } else { self.samples }
+    }
+
+    /// Where a sample is among those that are stored.
+    fn stored(&self, sample: u64) -> u64 {
+        let [first, last] = self.changes;
+        let sample = sample.min(self.samples.saturating_sub(1));
+        match sample < first || last == 0 {
+            true => 0,
+            false => sample.min(last).saturating_sub(first).saturating_add(1),
+        }
+    }
+
     pub fn is_compound(&self) -> bool {
         self.info & 3 == 0
     }
@@ -190,15 +213,18 @@ impl<'a> Ogawa<'a> {
         if version != 1 {
             return value(6, "the version of Ogawa", version, 1, EXPORT_AGAIN);
         }
-        let looks_left = bytes.len().saturating_mul(LOOKS).saturating_add(LOOKS_ANYWAY);
-        let looks_left = Cell::new(looks_left);
-        let mut archive = Self { bytes, metadata: vec![""], top: 0, looks_left };
+        let (top, times, sample) = (0, 0, 0);
+        let metadata = vec![""];
+        let looks_left = Cell::new(0);
+        let mut archive = Self { bytes, metadata, top, times, sample, looks_left };
+        archive.look_again();
         let at = Cursor { bytes, at: 8 }.number(8)?;
         let root = archive.group(at)?;
         if root.len < 6 {
             return value(at, "the count of the archive's parts", root.len, 6, EXPORT_AGAIN);
         }
         archive.top = archive.child(root, 2)?;
+        archive.times = archive.child(root, 4)?;
         let (mut shared, _) = archive.data(archive.child(root, 5)?)?;
         while !shared.is_at_end() && archive.metadata.len() < usize::from(OWN_METADATA) {
             archive.metadata.push(shared.text(1)?);
@@ -275,6 +301,20 @@ impl<'a> Ogawa<'a> {
         }
     }
 
+    /// How many bytes the file has.
+    pub fn len(&self) -> usize {
+        self.bytes.0.len()
+    }
+
+    /// As much may be looked at again: for another sample.
+    pub fn look_again(&self) {
+        self.looks_left.set(self.most_looks());
+    }
+
+    fn most_looks(&self) -> u64 {
+        self.bytes.len().saturating_mul(LOOKS).saturating_add(LOOKS_ANYWAY)
+    }
+
     pub fn top(&self) -> Object<'a> {
         Object { name: "", metadata: "", at: self.top }
     }
@@ -327,16 +367,23 @@ impl<'a> Ogawa<'a> {
             let start = headers.at;
             let info = headers.number(4)?;
             let size = [1, 2, 4, 4][(info >> 2 & 3) as usize];
-            let mut samples = 0;
+            let (mut samples, mut changes, mut times) = (0, [0; 2], 0);
             if info & 3 != 0 {
                 samples = headers.number(size)?;
-                // The first and last samples that differ, and the times.
-                headers.take(size * (2 * (info >> 9 & 1) + (info >> 8 & 1)))?;
+                if info >> 9 & 1 == 1 {
+                    changes = [headers.number(size)?, headers.number(size)?];
+                } else if info >> 11 & 1 == 0 {
+                    changes = [1, samples.saturating_sub(1)];
+                }
+                if info >> 8 & 1 == 1 {
+                    times = headers.number(size)?;
+                }
             }
             let name = headers.text(size)?;
             self.metadata(&mut headers, (info >> 20) as u8, size)?;
             self.look(start, headers.at - start)?;
-            if visit(Property { name, samples, info, at: self.child(group, k)? }) {
+            let at = self.child(group, k)?;
+            if visit(Property { name, samples, changes, times, info, at }) {
                 break;
             }
         }
@@ -373,7 +420,7 @@ impl<'a> Ogawa<'a> {
         self.compound(property.at)
     }
 
-    /// The numbers of a property's first sample; `None` where there are none.
+    /// The numbers of a property's [`sample`](Self::sample), or of its last; `None` where there are none.
     pub fn values(&self, property: Property<'a>) -> Result<Option<Values<'a>>, GroomFileError> {
         let group = match property.is_compound() || property.samples == 0 {
             true => return Ok(None),
@@ -383,10 +430,44 @@ impl<'a> Ogawa<'a> {
         else {
             return Ok(None);
         };
-        let (data, len) = self.data(self.child(group, 0)?)?;
+        // Dimensions follow each array.
+        let parts = if property.info & 3 == 1 { 1 } else { 2 };
+        let stored = property.stored(self.sample).saturating_mul(parts);
+        let (data, len) = self.data(self.child(group, stored.min(group.len - 1))?)?;
         let from = data.at as usize + KEY;
         let bytes = data.bytes.0.get(from..).filter(|bytes| len > 0 && bytes.len() >= size);
         Ok(bytes.map(|bytes| Values { bytes, size, number, at: from as u64 }))
+    }
+
+    /// When a sample is (s), by its [kind of times](Property::times).
+    pub fn time(&self, kind: u64, sample: u64) -> Result<f64, GroomFileError> {
+        let (mut cursor, len) = self.data(self.times)?;
+        let end = cursor.at + len;
+        // Of each kind of times the most samples, the length of a cycle, and when in it samples are.
+        for found in 0.. {
+            cursor.number(4)?;
+            let cycle = f64::from_bits(cursor.number(8)?);
+            let count = cursor.number(4)?;
+            let at = cursor.at;
+            let times = cursor.take(count.saturating_mul(8))?;
+            self.look(at, 16)?;
+            if found == kind {
+                let (cycles, within) = match count {
+                    0 => return Ok(sample as f64),
+                    // Without a cycle.
+                    _ if cycle > 1e30 => (0.0, sample.min(count - 1)),
+                    _ => ((sample / count) as f64, sample % count),
+                };
+                let time = times.get(8 * within as usize..).and_then(|bytes| bytes.first_chunk());
+                let time = time.map_or(f64::NAN, |bytes| f64::from_le_bytes(*bytes));
+                return Ok(if cycles == 0.0 { time } else { cycles.mul_add(cycle, time) });
+            }
+            if cursor.at >= end {
+                break;
+            }
+        }
+        let expected = "one of those at the archive's beginning";
+        value(self.times & !DATA, "which times samples have", kind, expected, EXPORT_AGAIN)
     }
 
     /// The texts of a property's first sample, each ended by a zero, up to `most`; none where it has numbers.
@@ -416,5 +497,29 @@ impl<'a> Ogawa<'a> {
         name: &str,
     ) -> Result<Option<Values<'a>>, GroomFileError> {
         self.find(compound, name)?.map_or(Ok(None), |property| self.values(property))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_do_not_differ_are_stored_once() {
+        let property = |samples, changes| {
+            let (name, times, info, at) = ("P", 0, 2, 0);
+            Property { name, samples, changes, times, info, at }
+        };
+        let stored =
+            |of: Property<'_>| (0..of.samples + 2).map(|k| of.stored(k)).collect::<Vec<_>>();
+        let still = property(4, [0, 0]);
+        assert_eq!((still.moments(), stored(still)), (1, vec![0; 6]));
+        let moving = property(4, [1, 3]);
+        assert_eq!((moving.moments(), stored(moving)), (4, vec![0, 1, 2, 3, 3, 3]));
+        let for_a_while = property(6, [2, 4]);
+        assert_eq!((for_a_while.moments(), stored(for_a_while)), (6, vec![0, 0, 1, 2, 3, 3, 3, 3]));
+        let broken = property(6, [5, 2]);
+        assert_eq!(stored(broken), [0, 0, 0, 0, 0, 1, 1, 1]);
+        assert_eq!(stored(property(0, [1, 0])), [0, 0]);
     }
 }

@@ -1,7 +1,7 @@
 //! Archives written here: transforms, types, attributes, and everything that can be wrong.
 
 use super::{
-    super::{GroomFormat, GroomGroup, GroomSettings, GroomStrand},
+    super::{GroomCache, GroomFormat, GroomGroup, GroomSettings, GroomStrand, UpAxis},
     params::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH},
     write::{Archive, Pod, Written, floats},
     *,
@@ -274,14 +274,110 @@ fn optional_numbers_are_recognised_by_their_count() {
 }
 
 #[test]
-fn the_first_sample_counts() {
-    let mut archive = Archive::new();
+fn a_groom_has_the_first_sample_and_a_cache_all() {
+    let file = moving(&[0.5, 0.75, 1.5]);
+    let (groom, losses) = read(&file).unwrap();
+    assert_eq!((groom.points()[0], losses.unread_samples.count), (Vec3::ZERO, 2));
+    let (cache, losses) = GroomCache::from_file(&file, &GroomSettings::default()).unwrap();
+    assert!(losses.is_empty(), "{losses}");
+    assert_eq!((cache.groom(), cache.times()), (&groom, &[0.0, 0.25, 1.0][..]));
+    for (frame, x) in [0.0, 1.0, 3.0].into_iter().enumerate() {
+        let expected: Vec<Vec3> =
+            groom.points().iter().map(|p| *p + Vec3::new(x, 2.0 * x, 0.0)).collect();
+        assert_eq!(cache.frame(frame), expected, "{frame}");
+    }
+    // In the same unit and axes, thinned alike, with as many nodes each.
+    let settings = GroomSettings {
+        scale: Some(0.01),
+        up: Some(UpAxis::Z),
+        keep_every: 2,
+        nodes: Some(5),
+        ..default()
+    };
+    let (cache, losses) = GroomCache::from_file(&file, &settings).unwrap();
+    assert_eq!((cache.groom().len(), losses.thinned_strands.count), (1, 1));
+    let last = cache.frame(2);
+    assert!(last.len() == 5 && last[0].distance(Vec3::new(0.03, 0.0, -0.06)) < 1e-7, "{last:?}");
+    assert!(last[4].distance(Vec3::new(0.03, 0.0, -0.08)) < 1e-7, "{last:?}");
+    // Evenly apart, as most exporters have them: the length of a cycle, and when in it a sample is.
+    let mut even = file.clone();
+    let acyclic = (f64::MAX / 32.0).to_le_bytes();
+    let at = even.windows(8).position(|bytes| bytes == acyclic).unwrap();
+    even[at..at + 8].copy_from_slice(&0.04_f64.to_le_bytes());
+    even[at + 8..at + 12].copy_from_slice(&1u32.to_le_bytes());
+    let (cache, _) = GroomCache::from_file(&even, &GroomSettings::default()).unwrap();
+    let times = cache.times();
+    assert!((times[1] - 0.04).abs() < 1e-7 && (times[2] - 0.08).abs() < 1e-7, "{times:?}");
+}
+
+/// Two curves that move along X by P, to 0, 1 and 3, and by the transform above them along Y by twice that.
+fn moving(times: &[f32; 3]) -> Vec<u8> {
+    let mut archive = Archive::animated(times);
     let mut properties = needed(&mut archive, 3, [1, 0, 0]);
-    let moved: Vec<f32> = points(3).into_iter().map(|x| x + 1.0).collect();
-    properties[0] = archive.array("P", "", (Pod::F32, 3), &[&floats(points(3)), &floats(moved)]);
-    let set = set(&mut archive, "hair", properties);
-    let (groom, losses) = read(&archive.finished(vec![set])).unwrap();
-    assert_eq!((groom.points()[0], losses.unread_samples.count), (Vec3::ZERO, 1));
+    let ways = [0.0, 1.0, 3.0_f32];
+    let along = |x: f32| {
+        floats(points(3).into_iter().enumerate().map(|(i, n)| if i % 3 == 0 { n + x } else { n }))
+    };
+    let samples = ways.map(along);
+    properties[0] = archive.array("P", "", (Pod::F32, 3), &samples.each_ref().map(Vec::as_slice));
+    let hair = set(&mut archive, "hair", properties);
+    let up = ways.map(|x| doubles(&[0.0, f64::from(2.0 * x), 0.0]));
+    let properties = vec![
+        archive.scalar(".ops", "", (Pod::U8, 1), &[1 << 4]),
+        archive.scalars(".vals", "", (Pod::F64, 3), &up.each_ref().map(Vec::as_slice)),
+    ];
+    let properties = vec![archive.compound(".xform", XFORM, properties)];
+    let place = archive.object("place", XFORM, properties, vec![hair]);
+    archive.finished(vec![place])
+}
+
+#[test]
+fn frames_that_cannot_be_played_are_errors_that_name_them() {
+    let of = |samples: &[&[f32]], times: &[f32]| {
+        let mut archive = Archive::animated(times);
+        let mut properties = needed(&mut archive, 3, [1, 0, 0]);
+        let samples: Vec<Vec<u8>> = samples.iter().map(|s| floats(s.iter().copied())).collect();
+        let samples: Vec<&[u8]> = samples.iter().map(Vec::as_slice).collect();
+        properties[0] = archive.array("P", "", (Pod::F32, 3), &samples);
+        let set = set(&mut archive, "hair", properties);
+        let file = archive.finished(vec![set]);
+        GroomCache::from_file(&file, &GroomSettings::default()).unwrap_err().to_string()
+    };
+    let good = points(3);
+    let says = of(&[&good, &good[3..]], &[0.0, 1.0]);
+    assert!(says.contains("5 in /hair, expected 6"), "{says}");
+    let mut broken = good.clone();
+    broken[4] = f32::NAN;
+    let says = of(&[&good, &broken], &[0.0, 1.0]);
+    assert!(says.contains("node 1 of frame 1 is not finite"), "{says}");
+    let says = of(&[&good, &good], &[1.0, 1.0]);
+    assert!(says.contains("frame 1 is at 0 s, expected a finite time after 0 s"), "{says}");
+}
+
+#[test]
+fn changed_bytes_of_what_moves_do_no_harm() {
+    let (mut state, mut read_all) = (1u64, 0);
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (state >> 33) as usize % below
+    };
+    let whole = moving(&[0.0, 0.1, 0.2]);
+    for end in 6..whole.len() {
+        let read = GroomCache::from_file(&whole[..end], &GroomSettings::default());
+        assert!(read.unwrap_err().to_string().starts_with("byte "), "{end}");
+    }
+    for _ in 0..3000 {
+        let mut file = whole.clone();
+        for _ in 0..=random(4) {
+            let at = random(file.len());
+            file[at] = random(256) as u8;
+        }
+        if let Ok((cache, _)) = GroomCache::from_file(&file, &GroomSettings::default()) {
+            read_all += 1;
+            assert!(cache.len() * cache.groom().points().len() * 12 <= 16 * file.len() + (1 << 20));
+        }
+    }
+    assert!(read_all > 300, "{read_all}");
 }
 
 #[test]

@@ -1,10 +1,12 @@
 //! Writes Alembic archives.
 
 use super::params::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, from_the_top};
-use crate::authoring::groom::{Groom, GroomError, GroomGroup};
+use crate::authoring::groom::{Groom, GroomCache, GroomError, GroomGroup};
 use bevy::prelude::*;
 
 const DATA: u64 = 1 << 63;
+/// The length of a cycle of times that have none.
+const ACYCLIC: f64 = f64::MAX / 32.0;
 /// The version of the library whose files these are like.
 const LIBRARY: i32 = 10_803;
 const CURVES: &str = "schema=AbcGeom_Curve_v2;schemaBaseType=AbcGeom_GeomBase_v1";
@@ -32,12 +34,19 @@ pub(super) struct Written {
 pub(super) struct Archive {
     file: Vec<u8>,
     metadata: Vec<String>,
+    /// When samples are (s), of all that is in it.
+    times: Vec<f64>,
 }
 
 impl Archive {
     pub(super) fn new() -> Self {
         // The mark of a finished file and the root's position come last.
-        Self { file: b"Ogawa\0\0\x01\0\0\0\0\0\0\0\0".to_vec(), metadata: vec![String::new()] }
+        let file = b"Ogawa\0\0\x01\0\0\0\0\0\0\0\0".to_vec();
+        Self { file, metadata: vec![String::new()], times: vec![0.0] }
+    }
+
+    pub(super) fn animated(times: &[f32]) -> Self {
+        Self { times: times.iter().copied().map(f64::from).collect(), ..Self::new() }
     }
 
     fn data(&mut self, parts: &[&[u8]]) -> u64 {
@@ -96,9 +105,16 @@ impl Archive {
     }
 
     fn property(&mut self, name: &str, info: u32, samples: Option<usize>, at: u64) -> Written {
-        // Lengths of 32 bits, constant samples of one size.
-        let mut header = (info | 0b1000 | samples.map_or(0, |_| 0xc00)).to_le_bytes().to_vec();
-        header.extend(samples.into_iter().flat_map(|count| (count as u32).to_le_bytes()));
+        // Lengths of 32 bits, samples of one size, constant ones, times other than those of what stands still.
+        let (count, is_animated) = (self.times.len() as u32, self.times.len() > 1);
+        let of_samples = samples.map_or(0, |stored| {
+            0x400 | if stored == 1 { 0x800 } else { 0 } | if is_animated { 0x100 } else { 0 }
+        });
+        let mut header = (info | 0b1000 | of_samples).to_le_bytes().to_vec();
+        if samples.is_some() {
+            header.extend(count.to_le_bytes());
+            header.extend(is_animated.then_some(1u32.to_le_bytes()).into_iter().flatten());
+        }
         header.extend((name.len() as u32).to_le_bytes());
         header.extend(name.bytes());
         Written { header, at }
@@ -117,10 +133,20 @@ impl Archive {
         (pod, extent): (Pod, u32),
         bytes: &[u8],
     ) -> Written {
+        self.scalars(name, metadata, (pod, extent), &[bytes])
+    }
+
+    pub(super) fn scalars(
+        &mut self,
+        name: &str,
+        metadata: &str,
+        (pod, extent): (Pod, u32),
+        samples: &[&[u8]],
+    ) -> Written {
         let info = self.shared(metadata) << 20 | extent << 12 | (pod as u32) << 4 | 1;
-        let sample = self.sample(bytes);
-        let at = self.group([sample]);
-        self.property(name, info, Some(1), at)
+        let parts: Vec<u64> = samples.iter().map(|s| self.sample(s)).collect();
+        let at = self.group(parts);
+        self.property(name, info, Some(samples.len()), at)
     }
 
     pub(super) fn array(
@@ -162,6 +188,13 @@ impl Archive {
         times.extend(1f64.to_le_bytes());
         times.extend(1u32.to_le_bytes());
         times.extend(0f64.to_le_bytes());
+        if self.times.len() > 1 {
+            let count = (self.times.len() as u32).to_le_bytes();
+            times.extend(count);
+            times.extend(ACYCLIC.to_le_bytes());
+            times.extend(count);
+            times.extend(self.times.iter().flat_map(|time| time.to_le_bytes()));
+        }
         let parts = [
             self.data(&[&0i32.to_le_bytes()]),
             self.data(&[&LIBRARY.to_le_bytes()]),
@@ -221,18 +254,42 @@ pub(super) fn floats(numbers: impl IntoIterator<Item = f32>) -> Vec<u8> {
 /// # Errors
 /// When the groom is empty.
 pub fn write(groom: &Groom) -> Result<Vec<u8>, GroomError> {
-    let (low, high) = groom.extents().ok_or(GroomError::Empty)?;
-    let mut archive = Archive::new();
+    write_samples(groom, &[groom.points()], Archive::new())
+}
+
+/// The same of a groom that moves: a sample of the nodes for each frame, at its time.
+///
+/// # Errors
+/// When the cache is empty.
+pub fn write_cache(cache: &GroomCache) -> Result<Vec<u8>, GroomError> {
+    let frames: Vec<&[Vec3]> = (0..cache.len()).map(|frame| cache.frame(frame)).collect();
+    if frames.is_empty() {
+        return Err(GroomError::Empty);
+    }
+    write_samples(cache.groom(), &frames, Archive::animated(cache.times()))
+}
+
+fn write_samples(
+    groom: &Groom,
+    frames: &[&[Vec3]],
+    mut archive: Archive,
+) -> Result<Vec<u8>, GroomError> {
+    groom.extents().ok_or(GroomError::Empty)?;
+    let all = || frames.iter().flat_map(|frame| frame.iter());
+    let low = all().fold(Vec3::INFINITY, |low, p| low.min(*p));
+    let high = all().fold(Vec3::NEG_INFINITY, |high, p| high.max(*p));
     let bounds = [low, high].map(|corner| corner.to_array().map(f64::from)).concat();
     let bounds: Vec<u8> = bounds.into_iter().flat_map(f64::to_le_bytes).collect();
-    let points = floats(groom.points().iter().flat_map(Vec3::to_array));
+    let points: Vec<Vec<u8>> =
+        frames.iter().map(|frame| floats(frame.iter().flat_map(Vec3::to_array))).collect();
+    let points: Vec<&[u8]> = points.iter().map(Vec::as_slice).collect();
     let counts = groom.strands().flat_map(|s| (s.points.len() as i32).to_le_bytes());
     let counts: Vec<u8> = counts.collect();
     // Linear, open, no basis.
     let kind = [1, 0, 0, 0];
     let mut set = vec![
         archive.scalar(".selfBnds", "interpretation=box", (Pod::F64, 6), &bounds),
-        archive.array("P", "geoScope=vtx;interpretation=point", (Pod::F32, 3), &[&points]),
+        archive.array("P", "geoScope=vtx;interpretation=point", (Pod::F32, 3), &points),
         archive.array("nVertices", "", (Pod::I32, 1), &[&counts]),
         archive.scalar("curveBasisAndType", "", (Pod::U8, 4), &kind),
     ];

@@ -1,0 +1,274 @@
+//! Hair that a cache moves in place of the tick.
+
+use super::GroomCache;
+use crate::{
+    authoring::groom::reshape::{arc_lengths, place},
+    base::{
+        fault::{FaultKind, HairFault},
+        grid::KdTree,
+        schedule::{HairFrame, HairStep, HairSystems, HairTick, last_substep},
+    },
+    hair::strand::{
+        Hair, PlayedHair, Regroomed, Settling, SimulatedHere, Strand, StrandHistory, StrandRank,
+        Strands, TickPose,
+    },
+};
+use bevy::{
+    asset::{AssetEvent, LoadState},
+    platform::collections::HashSet,
+    prelude::*,
+};
+use core::ops::Range;
+
+/// Plays a [`GroomCache`] on a hair: its strands are where the cache says, in the hair's frame, in place of being simulated.
+/// On the entity of the [`Hair`]; it is simulated until the asset is there, and again, with the velocities that it has by
+/// then, once this is removed. Meanwhile bonds, water and treatments wait, as does settling, and it is not on the GPU; strands
+/// that follow others at a [level of detail](crate::HairLod), and strands that are drawn between others, follow those that
+/// are played. [`MotionOwner::Played`](crate::MotionOwner::Played) says that it is on.
+///
+/// A hair of as many strands as the cache, with as many nodes each, plays node by node; of a recorded hair that is the order
+/// of its strands. Else each strand plays the one of the cache whose root was nearest in the first frame, its own nodes evenly
+/// along it: as guides of [`GroomedHair`](crate::authoring::groom::GroomedHair) grow on that groom. Lengths are not restored:
+/// what a file stretches stays stretched until the hair is simulated again.
+///
+/// ```
+/// # use bevy_keratin::{prelude::*, authoring::groom::*}; use bevy::prelude::*;
+/// fn dance(hair: Query<Entity, With<Hair>>, assets: Res<AssetServer>, mut commands: Commands) {
+///     for hair in &hair {
+///         let cache = assets.load::<GroomCache>("dance.abc");
+///         commands.entity(hair).insert(PlayGroomCache { repeat: true, ..PlayGroomCache::new(cache) });
+///     }
+/// }
+/// ```
+#[derive(Component, Reflect, Clone, Debug, PartialEq)]
+#[reflect(Component, Default, Clone, PartialEq)]
+pub struct PlayGroomCache {
+    /// What is played.
+    pub cache: Handle<GroomCache>,
+    /// Where in it, from its first frame (s): 0. Ticks advance it up to the last frame; writing it jumps.
+    pub time: f32,
+    /// How many seconds of it in a second of the game: 1. Negative plays backwards, 0 stands still.
+    pub speed: f32,
+    /// Whether it begins again at the other end: false, so it stays there.
+    pub repeat: bool,
+}
+
+impl Default for PlayGroomCache {
+    fn default() -> Self {
+        Self { cache: default(), time: 0.0, speed: 1.0, repeat: false }
+    }
+}
+
+impl PlayGroomCache {
+    /// From the first frame on, once.
+    pub fn new(cache: Handle<GroomCache>) -> Self {
+        Self { cache, ..default() }
+    }
+
+    /// The time so many seconds later, and whether that is a jump.
+    fn after(&self, seconds: f32, duration: f32) -> (f32, bool) {
+        let [time, speed] = [self.time, self.speed].map(|n| if n.is_finite() { n } else { 0.0 });
+        let next = time + speed * seconds;
+        if (0.0..=duration).contains(&next) || !self.repeat || duration <= 0.0 {
+            return (next.clamp(0.0, duration), false);
+        }
+        (next.rem_euclid(duration), true)
+    }
+}
+
+/// What a hair plays.
+#[derive(Component, Clone, Debug, Default)]
+#[component(clone_behavior = Ignore)]
+struct Playback {
+    cache: AssetId<GroomCache>,
+    /// Which strand of the cache each strand plays.
+    strands: Vec<(Entity, u32)>,
+    /// Where the tick before has left it (s).
+    time: Option<f32>,
+    /// Whether it was reported that it cannot be played.
+    reported: bool,
+}
+
+pub(super) fn build(app: &mut App) {
+    app.register_type::<PlayGroomCache>().add_observer(stop);
+}
+
+pub(super) fn with_assets(app: &mut App) {
+    app.add_systems(HairFrame, begin).add_systems(
+        HairTick,
+        play.in_set(HairSystems::Projection).before(HairSystems::Rods).run_if(last_substep),
+    );
+}
+
+fn stop(left: On<Remove, PlayGroomCache>, mut commands: Commands) {
+    commands.entity(left.entity).try_remove::<(Playback, PlayedHair)>();
+}
+
+/// Finds the strands of the cache that hair plays.
+fn begin(
+    mut commands: Commands,
+    (caches, assets): (Res<Assets<GroomCache>>, Res<AssetServer>),
+    mut events: MessageReader<AssetEvent<GroomCache>>,
+    mut hairs: Query<
+        (Entity, Ref<PlayGroomCache>, Option<&mut Playback>, Ref<Regroomed>, Option<Ref<Strands>>),
+        With<Hair>,
+    >,
+    strands: Query<(&Strand, &StrandRank)>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    let changed: HashSet<_> = events
+        .read()
+        .filter_map(|event| match event {
+            AssetEvent::Modified { id } | AssetEvent::Added { id } => Some(*id),
+            _ => None,
+        })
+        .collect();
+    for (hair, wanted, playback, regroomed, members) in &mut hairs {
+        let Some(mut playback) = playback else {
+            commands.entity(hair).insert(Playback::default());
+            continue;
+        };
+        let id = wanted.cache.id();
+        if wanted.is_changed() && ![wanted.time, wanted.speed].iter().all(|n| n.is_finite()) {
+            let message = format!(
+                "PlayGroomCache has time {} s and speed {}, expected finite numbers: 0 is taken",
+                wanted.time, wanted.speed
+            );
+            faults.write(HairFault::new(FaultKind::Setting, message).of(hair));
+        }
+        let Some(cache) = caches.get(id) else {
+            if let (LoadState::Failed(error), false) = (assets.load_state(id), playback.reported) {
+                let error = error.to_string();
+                let error = error.lines().next().unwrap_or_default().to_owned();
+                let message = format!("the hair's cache was not loaded: {error}; it is simulated");
+                faults.write(HairFault::new(FaultKind::Groom, message).of(hair));
+                playback.reported = true;
+                commands.entity(hair).try_remove::<PlayedHair>();
+            }
+            continue;
+        };
+        let are_others = members.as_ref().is_some_and(|members| members.is_changed());
+        let is_same = playback.cache == id && !playback.strands.is_empty();
+        if is_same && !are_others && !regroomed.is_changed() && !changed.contains(&id) {
+            continue;
+        }
+        let members = members.iter().flat_map(|members| members.iter());
+        let mut own: Vec<_> = members
+            .filter_map(|entity| Some((entity, strands.get(entity).ok()?)))
+            .filter(|(_, (strand, _))| strand.nodes() >= 2)
+            .collect();
+        own.sort_by_key(|(entity, (_, rank))| (**rank, *entity));
+        let own: Vec<(Entity, &Strand)> =
+            own.into_iter().map(|(entity, (strand, _))| (entity, strand)).collect();
+        playback.strands = matched(cache, &own);
+        (playback.cache, playback.reported) = (id, false);
+        if !playback.strands.is_empty() {
+            commands.entity(hair).insert(PlayedHair).remove::<Settling>();
+        }
+    }
+}
+
+/// Which strand of a cache each of these plays.
+fn matched(cache: &GroomCache, own: &[(Entity, &Strand)]) -> Vec<(Entity, u32)> {
+    let strands = || cache.groom().strands();
+    let is_same = own.len() == strands().len()
+        && own.iter().zip(strands()).all(|((_, own), of)| own.nodes() == of.points.len());
+    if is_same {
+        return own.iter().map(|(entity, _)| *entity).zip(0..).collect();
+    }
+    let roots =
+        (0..strands().len()).filter_map(|i| Some(cache.frame(0)[nodes_of(cache, i)?.start]));
+    let roots = KdTree::new(roots.zip(0..));
+    let nearest = |(entity, strand): &(Entity, &Strand)| {
+        let root = strand.positions().first()?;
+        let (of, _) = roots.nearest::<1>(*root).next()?;
+        Some((*entity, of))
+    };
+    own.iter().filter_map(nearest).collect()
+}
+
+/// Where the nodes of a strand are among those of a frame.
+fn nodes_of(cache: &GroomCache, strand: usize) -> Option<Range<usize>> {
+    (strand < cache.groom().len()).then(|| cache.groom().nodes_of(strand))
+}
+
+fn play(
+    step: Res<HairStep>,
+    caches: Res<Assets<GroomCache>>,
+    mut hairs: Query<(&mut PlayGroomCache, &mut Playback, &TickPose), With<PlayedHair>>,
+    mut strands: Query<(&mut Strand, &mut StrandHistory), SimulatedHere>,
+    mut scratch: Local<[Vec<Vec3>; 2]>,
+) {
+    let seconds = step.dt * step.count as f32;
+    for (mut wanted, mut playback, pose) in &mut hairs {
+        let Some(cache) = caches.get(playback.cache) else { continue };
+        let was_put = playback.time.is_none_or(|time| time != wanted.time);
+        let (time, wraps) = wanted.after(seconds, cache.duration());
+        // What it was just before, wherever it has come from.
+        let forth = if wanted.speed < 0.0 { -seconds } else { seconds };
+        let is_still = wanted.speed == 0.0 || !wanted.speed.is_finite();
+        let [now, before] = &mut *scratch;
+        cache.at(time, now);
+        cache.at(time - forth * wanted.speed.abs(), before);
+        let per_second = if is_still { 0.0 } else { seconds.recip() };
+        wanted.bypass_change_detection().time = time;
+        playback.time = Some(time);
+        for (entity, of) in &playback.strands {
+            let (Ok((mut strand, mut history)), Some(nodes)) =
+                (strands.get_mut(*entity), nodes_of(cache, *of as usize))
+            else {
+                continue;
+            };
+            let strand = strand.bypass_change_detection();
+            let even = Even::of(&now[nodes.clone()], strand.nodes());
+            let [now, before] = [&now[nodes.clone()], &before[nodes]];
+            strand.put_nodes(|node| {
+                let [now, before] = [now, before].map(|points| even.at(points, node));
+                (now, (now - before) * per_second + pose.motion_at(now))
+            });
+            if was_put || wraps {
+                history.bypass_change_detection().remember(strand);
+            }
+        }
+    }
+}
+
+/// A polyline as evenly spaced nodes, of another pose by the same shares of its segments.
+struct Even(Vec<(usize, f32)>);
+
+impl Even {
+    /// Node by node where there are as many.
+    fn of(points: &[Vec3], nodes: usize) -> Self {
+        if points.len() == nodes {
+            return Self(Vec::new());
+        }
+        let mut along = Vec::new();
+        let length = arc_lengths(points, &mut along);
+        let share = |node: usize| node as f64 / (nodes - 1) as f64;
+        Self((0..nodes).map(|node| place(&along, length * share(node))).collect())
+    }
+
+    fn at(&self, points: &[Vec3], node: usize) -> Vec3 {
+        match self.0.get(node) {
+            Some((segment, share)) => points[*segment].lerp(points[segment + 1], *share),
+            None => points[node],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_ends_at_the_last_frame_or_begins_again() {
+        let play = |time, speed, repeat| PlayGroomCache { time, speed, repeat, ..default() };
+        assert_eq!(play(0.5, 1.0, false).after(0.25, 2.0), (0.75, false));
+        assert_eq!(play(1.9, 1.0, false).after(0.25, 2.0), (2.0, false));
+        assert_eq!(play(1.75, 1.0, true).after(0.5, 2.0), (0.25, true));
+        assert_eq!(play(0.25, -1.0, true).after(0.5, 2.0), (1.75, true));
+        assert_eq!(play(0.25, -1.0, false).after(0.5, 2.0), (0.0, false));
+        assert_eq!(play(f32::NAN, f32::INFINITY, true).after(0.5, 2.0), (0.0, false));
+        assert_eq!(play(1.0, 1.0, true).after(0.5, 0.0), (0.0, false));
+    }
+}
