@@ -6,6 +6,7 @@
 pub mod alembic;
 mod bones;
 mod bytes;
+mod curve_sets;
 #[cfg(feature = "render")]
 mod drawn;
 mod foreign;

@@ -1,8 +1,10 @@
 //! Archives written here: transforms, types, attributes, and everything that can be wrong.
 
 use super::{
-    super::{GroomFormat, GroomGroup, GroomSettings, GroomStrand},
-    params::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH},
+    super::{
+        GroomError, GroomFormat, GroomGroup, GroomSettings, GroomStrand,
+        curve_sets::{BYTES_PER_NODE, COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH},
+    },
     write::{Archive, Pod, Written, floats},
     *,
 };
