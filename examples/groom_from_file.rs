@@ -14,7 +14,7 @@ fn main() {
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>) -> Result {
-    // .abc, .hair, .tfx, .ply, .data and glTF are known. Only glTF says what its unit is and where up is.
+    // .abc, .hair, .tfx, .ply, .data, glTF and (feature `usd`) USD are known. Only the last two say their unit and where up is.
     let groom: Handle<Groom> = assets
         .load_builder()
         .with_settings(|settings: &mut GroomSettings| {

@@ -12,9 +12,12 @@ const TURN: f32 = TAU / 6.0;
 #[derive(Resource)]
 pub struct Loading(pub Handle<Groom>);
 
-/// What kind of file it is.
+/// Metres per unit and the axis that is up, as the file says or is usual for its kind.
 #[derive(Resource)]
-pub struct Kind(pub GroomFormat);
+pub struct Usual {
+    pub scale: f32,
+    pub up: UpAxis,
+}
 
 /// Why no hair has grown.
 #[derive(Resource, Default)]
@@ -111,9 +114,9 @@ fn load(
     mut commands: Commands,
     assets: Res<AssetServer>,
     arguments: Res<Arguments>,
-    kind: Res<Kind>,
+    usual: Res<Usual>,
 ) {
-    let scale = Some(arguments.scale.unwrap_or(kind.0.scale()));
+    let scale = Some(arguments.scale.unwrap_or(usual.scale));
     let up = arguments.up.map(UpAxis::from);
     let name = arguments.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let roots = arguments.roots.into();
@@ -127,13 +130,8 @@ fn load(
 }
 
 /// The groom in a size that hair can have. A scale that was asked for stays.
-fn sized(
-    groom: &Groom,
-    kind: GroomFormat,
-    asked: Option<f32>,
-    up: Option<UpAxis>,
-) -> Result<Groom> {
-    let scale = asked.unwrap_or(kind.scale());
+fn sized(groom: &Groom, usual: &Usual, asked: Option<f32>, up: Option<UpAxis>) -> Result<Groom> {
+    let scale = asked.unwrap_or(usual.scale);
     let mut factor = 1.0;
     if let Some(odd) = groom.odd_size(scale) {
         println!("with {scale} m a unit {odd}");
@@ -150,7 +148,7 @@ fn sized(
     if !losses.is_empty() {
         println!("{losses}");
     }
-    let up = up.unwrap_or(kind.up());
+    let up = up.unwrap_or(usual.up);
     if let Some(odd) = groom.odd_up(up) {
         let name = format!("{odd:?}").to_lowercase().replace("neg", "neg-");
         println!("with {up:?} up it lies on its side or stands on its head; try --up {name}");
@@ -165,13 +163,13 @@ fn put_on(
     mut paint: Paint,
     mut grooms: ResMut<Assets<Groom>>,
     loading: Res<Loading>,
-    (arguments, kind): (Res<Arguments>, Res<Kind>),
+    (arguments, usual): (Res<Arguments>, Res<Usual>),
 ) -> Result {
     let Some(groom) = grooms.get(&loading.0) else {
         return Ok(());
     };
     let up = arguments.up.map(UpAxis::from);
-    let groom = sized(groom, kind.0, arguments.scale, up)?;
+    let groom = sized(groom, &usual, arguments.scale, up)?;
     let ball = groom.fit_head();
     let roots = || groom.roots().map(|r| r / groom.len() as f32).sum::<Vec3>();
     let centre = ball.map_or_else(roots, |ball| ball.center.into());

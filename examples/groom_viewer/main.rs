@@ -44,17 +44,18 @@ use std::{
     process::ExitCode,
 };
 
-/// Shows a groom from an .abc, .hair, .tfx, .ply, .data, .gltf or .glb file on a head that turns to and fro.
+/// Shows a groom from an .abc, .hair, .tfx, .ply, .data, .gltf, .glb or (feature `usd`) USD file on a head that turns
+/// to and fro.
 #[derive(Parser, Resource, Clone)]
 #[command(version)]
 struct Arguments {
     /// The file.
     file: PathBuf,
-    /// Metres per unit of the file. If left out, what is usual for its kind, unless hair cannot be as
+    /// Metres per unit of the file. If left out, what it says or is usual for its kind, unless hair cannot be as
     /// large or as small as that makes it.
     #[arg(long, value_parser = scale)]
     scale: Option<f32>,
-    /// The file's axis that points up; what is usual for its kind if left out.
+    /// The file's axis that points up; what the file says or is usual for its kind if left out.
     #[arg(long)]
     up: Option<Up>,
     /// Which end of a strand is its root.
@@ -162,7 +163,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let path = arguments.file.display();
     let blamed = |error: std::io::Error| format!("{path}: {error}");
     let file = arguments.file.canonicalize().map_err(blamed)?;
-    let kind = GroomFormat::of(&std::fs::read(&file).map_err(blamed)?)
+    let (scale, up) = GroomSettings::default()
+        .scale_and_up_in(&std::fs::read(&file).map_err(blamed)?)
         .map_err(|error| format!("{path}: {error}"))?;
     // Before anything that takes long.
     arguments.offscreen.as_deref().map(picture::folder).transpose()?;
@@ -172,7 +174,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
     let mut app = renderer::app("groom viewer", arguments.size, offscreen, assets);
     app.insert_resource(ClearColor(Color::srgb(0.2, 0.21, 0.23)))
         .insert_resource(arguments.clone())
-        .insert_resource(head::Kind(kind))
+        .insert_resource(head::Usual { scale, up })
         .add_plugins(head::HeadPlugin);
     match &arguments.offscreen {
         Some(folder) => pictures(&mut app, arguments, folder),

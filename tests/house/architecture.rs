@@ -372,9 +372,10 @@ fn no_file_is_too_long_to_be_understood() {
 /// 49,480 before a hat held what grows under it, a character's own helmets hid hair, held hair gave way on the graphics card
 /// too, and what is done to hair in a pause stayed, 49,820 before reports of single hairs, grooms of drawn hair, strands of
 /// their own stiffness, groups by name, hair that keeps its hairdo on a changed groom, a pass of hair's own, and layers of drops, 51,210
-/// before contact by pairs of edges with friction and firm cores.
+/// before contact by pairs of edges with friction and firm cores, 52,790 before USD, whose layers are checked before
+/// its library believes them, and grooms that move, which are recorded, read, written and played.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 52_790;
+const MOST_LINES: usize = 55_130;
 
 #[test]
 fn the_crate_stays_small() {

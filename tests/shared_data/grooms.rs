@@ -234,7 +234,11 @@ fn broken_alembic(folder: &Path, step: usize, changed: usize) {
 
 fn usd_is_named(folder: &Path) {
     for name in ["curves.usdc", "curves-small.usda"] {
-        let error = GroomFormat::of(&bytes(folder, name)).unwrap_err().to_string();
-        assert!(error.contains("USD"), "{name}: {error}");
+        let file = bytes(folder, name);
+        assert_eq!(GroomFormat::of(&file), Ok(GroomFormat::Usd));
+        if !cfg!(feature = "usd") {
+            let error = Groom::from_file(&file, &default()).unwrap_err().to_string();
+            assert!(error.contains("turn on the feature `usd`"), "{name}: {error}");
+        }
     }
 }

@@ -2,6 +2,8 @@
 //! reported as ignored.
 
 mod grooms;
+#[cfg(feature = "usd")]
+mod usd;
 
 use libtest_mimic::{Arguments, Completion, Trial, run};
 use std::path::{Path, PathBuf};
@@ -25,5 +27,8 @@ fn with(folder_name: &'static str, name: &str, test: fn(&Path)) -> Trial {
 }
 
 fn main() -> std::process::ExitCode {
-    run(&Arguments::from_args(), grooms::tests()).exit_code()
+    let tests = grooms::tests();
+    #[cfg(feature = "usd")]
+    let tests = tests.into_iter().chain(usd::tests()).collect();
+    run(&Arguments::from_args(), tests).exit_code()
 }

@@ -37,8 +37,8 @@ pub enum GroomFileError {
     },
     /// A file of another kind.
     #[error(
-        "byte 0: found {found}, expected the beginning of a groom (HAIR, glTF, JSON, Ogawa, ply or a \
-         TressFX version of 3 or 4): {hint}"
+        "byte 0: found {found}, expected the beginning of a groom (HAIR, glTF, JSON, Ogawa, USD, ply or \
+         a TressFX version of 3 or 4): {hint}"
     )]
     Foreign {
         /// What it is.
@@ -65,6 +65,33 @@ pub enum GroomFileError {
         expected: String,
         /// How to fix it.
         hint: &'static str,
+    },
+    /// A USD file, where the crate was built without the feature `usd`.
+    #[error(
+        "byte 0: found a USD file, expected one that this build reads: turn on the feature `usd` of \
+         bevy_keratin, or export the hair as Alembic (.abc)"
+    )]
+    UsdIsOff,
+    /// Something in a USD file that cannot be, or that contradicts the rest.
+    #[error("{place}: found {found}, expected {expected}: {hint}")]
+    Usd {
+        /// Path of the prim and its attribute.
+        place: String,
+        /// What is there.
+        found: String,
+        /// What may be there.
+        expected: String,
+        /// How to fix it.
+        hint: &'static str,
+    },
+    /// A USD file that the library cannot read.
+    #[error(
+        "the USD library failed: {message}; expected a whole file: export it again, as .usdc, or flatten \
+         it by usdcat --flatten"
+    )]
+    UsdLibrary {
+        /// What the library says.
+        message: String,
     },
     /// A `.tfxbone` that cannot be read; a byte is one of it.
     #[error("the .tfxbone, {0}; GroomSettings::bones can do without it")]

@@ -67,7 +67,8 @@ impl GroomCache {
         intake.losses.unread_samples = default();
         settings.choose(&mut intake)?;
         // Without merging, which would go by the frame.
-        let place = |groom| settings.resample(settings.place(groom, format)?);
+        let space = settings.scale_and_up_of(&intake, format);
+        let place = |groom| settings.resample(settings.place(groom, space)?);
         let groom = place(intake.groom.clone())?;
         let nodes = groom.points().len();
         let most = (file.len() as u64).saturating_mul(TIMES).saturating_add(ANYWAY);

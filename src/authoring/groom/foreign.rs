@@ -13,11 +13,9 @@ const OLD: &str = "convert it to a binary .tfx of version 3 or 4 with TressFX's 
 const UNKNOWN: &str = "an unknown kind of file";
 
 /// Beginnings of files, what they are, and what to do with them.
-const KNOWN: [(&[u8], &str, &str); 28] = [
+const KNOWN: [(&[u8], &str, &str); 26] = [
     (b"version https://git-lfs", "a Git LFS pointer", POINTER),
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file, as Alembic archives of before 2013 are", OGAWA),
-    (b"PXR-USDC", "a USD file (binary)", LINES),
-    (b"#usda", "a USD file (text)", LINES),
     (b"BLENDER", "a Blender file", LINES),
     (b"Kaydara FBX Binary", "an FBX file", LINES),
     (b"; FBX", "an FBX file (text)", LINES),
@@ -70,6 +68,18 @@ pub(super) fn described(file: &[u8]) -> (String, &'static str) {
         return (found, "write them with the header of a .hair: see yuksel::write");
     }
     (format!("{UNKNOWN} (it begins with {start})"), LINES)
+}
+
+/// Whether it is USD: binary, text, or a package, whose first entry is a layer.
+pub(super) fn is_usd(file: &[u8]) -> bool {
+    let first = || {
+        let length = u16::from_le_bytes(*file.get(26..)?.first_chunk()?);
+        let name = file.get(30..)?.get(..length.into())?;
+        let extension = name.rsplit(|byte| *byte == b'.').next()?;
+        Some([&b"usd"[..], b"usda", b"usdc"].contains(&extension))
+    };
+    let is_package = file.starts_with(b"PK\x03\x04") && first() == Some(true);
+    file.starts_with(b"PXR-USDC") || file.starts_with(b"#usda") || is_package
 }
 
 /// Whether nothing is known about it.

@@ -1,7 +1,7 @@
 //! A groom on its way in from a file: strands that cannot be are left out, and those that stay keep the
 //! numbers that they have in the file.
 
-use super::{Groom, GroomError, GroomLosses, RootBones, losses::GroomPlace};
+use super::{Groom, GroomError, GroomLosses, RootBones, UpAxis, losses::GroomPlace};
 use bevy::utils::default;
 
 /// A groom with the number that each strand has in its file, and what was left out.
@@ -13,6 +13,9 @@ pub(super) struct Intake {
     /// The numbers of strands that were stored from tip to root.
     pub(super) turned: Vec<usize>,
     pub losses: GroomLosses,
+    /// Metres per unit and the axis that is up, where the file says them.
+    pub scale: Option<f32>,
+    pub up: Option<UpAxis>,
 }
 
 impl Intake {
@@ -24,7 +27,7 @@ impl Intake {
 
     fn new(groom: Groom, losses: GroomLosses) -> Self {
         let all = groom.len();
-        Self { numbers: (0..all as u32).collect(), all, turned: Vec::new(), groom, losses }
+        Self { numbers: (0..all as u32).collect(), all, groom, losses, ..default() }
     }
 
     /// A groom as a file has it, whose numbers may be any: without strands of a single node or with a broken

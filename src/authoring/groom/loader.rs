@@ -1,9 +1,11 @@
 //! Grooms as assets.
 
+#[cfg(feature = "usd")]
+use super::usd;
 use super::{
     BonesFile, Groom, GroomCacheLoader, GroomError, GroomFileError, GroomFormat, GroomGroup,
     GroomLoss, GroomLosses, GroomPlace, GroomSettings, OddSize, RootBones, RootEnd, StrandBones,
-    alembic, cache, gltf, grown_hair, intake::Intake, ply, salon, tressfx, yuksel,
+    UpAxis, alembic, cache, gltf, grown_hair, intake::Intake, ply, salon, tressfx, yuksel,
 };
 use bevy::{
     asset::{
@@ -42,10 +44,10 @@ pub enum GroomLoadError {
     File(#[from] GroomFileError),
 }
 
-/// Loads a [`Groom`] from `.hair`, `.tfx`, `.abc`, `.ply`, `.data`, `.gltf` and `.glb`, detected by their
-/// contents.
+/// Loads a [`Groom`] from `.hair`, `.tfx`, `.abc`, `.usd`, `.usda`, `.usdc`, `.usdz` (feature `usd`), `.ply`,
+/// `.data`, `.gltf` and `.glb`, detected by their contents.
 ///
-/// It registers the first three extensions only, so as not to replace Bevy's own glTF loader and loaders of
+/// It does not register the last four extensions, so as not to replace Bevy's own glTF loader and loaders of
 /// meshes: name the type, as in `assets.load::<Groom>("hair.glb")`. The unit and the axis used, and what is
 /// left out of a file, are logged once.
 #[derive(TypePath, Clone, Copy, Debug, Default)]
@@ -86,8 +88,8 @@ impl AssetLoader for GroomLoader {
         if let Some(bones) = read_bones(format, settings, context).await? {
             bind(&mut intake, &bones)?;
         }
+        let (scale, up) = settings.scale_and_up_of(&intake, format);
         let (groom, losses) = settings.take(intake, format).map_err(GroomFileError::from)?;
-        let (scale, up) = (settings.scale_of(format), settings.up_of(format));
         let (path, count) = (context.path(), groom.len());
         tracing::info!("groom {path}: {count} strands, {scale} m a unit, {up:?} up");
         if losses.is_broken() {
@@ -109,13 +111,14 @@ impl AssetLoader for GroomLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        &["hair", "tfx", "abc"]
+        const ALL: [&str; 7] = ["hair", "tfx", "abc", "usd", "usda", "usdc", "usdz"];
+        if cfg!(feature = "usd") { &ALL } else { &ALL[..3] }
     }
 }
 
 impl Groom {
-    /// A groom from the bytes of a `.hair`, `.tfx`, `.abc`, `.ply`, `.data`, GLB or self-contained glTF file, in
-    /// metres and Y up according to the settings, and what was left out.
+    /// A groom from the bytes of a `.hair`, `.tfx`, `.abc`, `.ply`, `.data`, GLB, self-contained glTF or, with the
+    /// feature `usd`, USD file, in metres and Y up according to the settings, and what was left out.
     ///
     /// ```
     /// # use bevy_keratin::authoring::groom::*; use bevy::prelude::*;
@@ -155,6 +158,32 @@ impl Groom {
     }
 }
 
+impl GroomSettings {
+    /// Metres per unit and the axis that is up, with which these settings read a file: their own, else what the file
+    /// says, as USD does, else what is usual for its format.
+    ///
+    /// ```
+    /// # use bevy_keratin::authoring::groom::*; use bevy::prelude::*;
+    /// let file = yuksel::write(&Groom::from_polylines([[Vec3::ZERO, Vec3::Y]]).unwrap()).unwrap();
+    /// assert_eq!(GroomSettings::default().scale_and_up_in(&file), Ok((0.00254, UpAxis::Z)));
+    /// ```
+    ///
+    /// # Errors
+    /// When the file is in none of the formats, or broken where it says them.
+    pub fn scale_and_up_in(&self, file: &[u8]) -> Result<(f32, UpAxis), GroomFileError> {
+        let format = GroomFormat::of(file)?;
+        let mut intake = Intake::default();
+        (intake.scale, intake.up) = match format {
+            #[cfg(feature = "usd")]
+            GroomFormat::Usd => usd::unit_and_up(file)?,
+            #[cfg(not(feature = "usd"))]
+            GroomFormat::Usd => return Err(GroomFileError::UsdIsOff),
+            _ => (None, None),
+        };
+        Ok(self.scale_and_up_of(&intake, format))
+    }
+}
+
 fn intake(
     file: &[u8],
     format: GroomFormat,
@@ -167,6 +196,10 @@ fn intake(
         GroomFormat::Ply => ply::intake(file),
         GroomFormat::Salon => salon::intake(file),
         GroomFormat::Gltf => gltf::GltfFile::parse(file)?.intake(external),
+        #[cfg(feature = "usd")]
+        GroomFormat::Usd => usd::intake(file),
+        #[cfg(not(feature = "usd"))]
+        GroomFormat::Usd => Err(GroomFileError::UsdIsOff),
     }
 }
 

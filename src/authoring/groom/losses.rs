@@ -134,7 +134,9 @@ losses! {
     assumed_bones: "roots bound like the last one of the bones' file", false;
     /// Arrays of the file that a groom cannot hold, or of a type that is not read.
     unread_arrays: "arrays not read", false;
-    /// Primitives of a glTF file, and objects of an Alembic archive, that are no lines.
+    /// Other files that a USD file refers to, which are not read.
+    unread_files: "other files not read: flatten the file by usdcat --flatten, or pack them by usdzip", false;
+    /// Primitives of a glTF file, and objects of an Alembic archive or a USD file, that are no lines.
     skipped_primitives: "primitives skipped that are no lines", false;
     /// Curve sets that are hidden, by themselves or with what they are in.
     hidden_curves: "hidden curve sets left out", false;

@@ -8,6 +8,7 @@ mod bones;
 mod bytes;
 mod cache;
 mod cache_file;
+mod curve_sets;
 #[cfg(feature = "render")]
 mod drawn;
 mod foreign;
@@ -27,13 +28,16 @@ mod shared;
 mod size;
 mod strays;
 pub mod tressfx;
+mod up_axis;
+#[cfg(feature = "usd")]
+pub mod usd;
 pub mod yuksel;
 
 pub use bones::{BonesFile, RootBones, StrandBones};
 pub use bytes::GroomFileError;
 pub use cache::{GroomCache, GroomCacheError, PlayGroomCache, RecordGroomCache};
 pub use cache_file::GroomCacheLoader;
-pub use format::{GroomFormat, UpAxis};
+pub use format::GroomFormat;
 pub use loader::{GroomLoadError, GroomLoader, GroomPlugin};
 pub use losses::{GroomLoss, GroomLosses, GroomPlace};
 
@@ -42,6 +46,7 @@ pub use grown_hair::{GroomGuides, GroomedHair};
 pub use roots::RootEnd;
 pub use settings::GroomSettings;
 pub use size::OddSize;
+pub use up_axis::UpAxis;
 
 use crate::{base::setting::InvalidValue, keratin::bond::StrandStiffness};
 use bevy::prelude::*;
@@ -71,9 +76,9 @@ pub struct Groom {
 #[derive(Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Default, Clone, PartialEq)]
 pub struct GroomGroup {
-    /// Its number in the file, in Alembic `groom_group_id`; 0 where there is none.
+    /// Its number in the file, in Alembic and USD `groom_group_id`; 0 where there is none.
     pub id: i32,
-    /// Its name, in Alembic `groom_group_name`, else that of the curves.
+    /// Its name, in Alembic and USD `groom_group_name`, else that of the curves.
     pub name: String,
     /// Where its curves are in the file, such as `/groom/Head/Fringe/Fringe`; empty where the format has no names.
     pub path: String,
@@ -285,7 +290,7 @@ impl Groom {
     }
 
     /// The groom with a stiffness for each strand, as a share of that of its hair: strands that are simulated get
-    /// [`StrandStiffness`], all others follow them. Alembic has it as the attribute `groom_stiffness`.
+    /// [`StrandStiffness`], all others follow them. Alembic and USD have it as the attribute `groom_stiffness`.
     ///
     /// ```
     /// # use bevy_keratin::{prelude::*, authoring::groom::*};

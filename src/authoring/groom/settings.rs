@@ -24,7 +24,7 @@ setting! {
     /// }
     /// ```
     ///
-    /// Files other than glTF do not specify their unit; the defaults are those of the formats' own
+    /// Files other than glTF and USD do not specify their unit; the defaults are those of the formats' own
     /// samples. The unit used is logged, with a warning and a better scale if the size is implausible for
     /// hair: see [`Groom::odd_size`]; and likewise the axis: see [`Groom::odd_up`].
     ///
@@ -38,6 +38,7 @@ setting! {
     /// | `.tfx`, version 4 | 1 | Y |
     /// | glTF | 1 | Y |
     /// | Alembic | 1, as Blender writes it; Maya's and Unreal Engine's are in centimetres: 0.01 | Y |
+    /// | USD | as the file says, else 0.01 | as the file says, else Y |
     /// | `.ply`, `.data` | 1 | Y |
     #[derive(Reflect, Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
     #[serde(default)]
@@ -95,7 +96,8 @@ impl GroomSettings {
         format: GroomFormat,
     ) -> Result<(Groom, GroomLosses), GroomError> {
         self.choose(&mut intake)?;
-        let mut groom = self.place(core::mem::take(&mut intake.groom), format)?;
+        let space = self.scale_and_up_of(&intake, format);
+        let mut groom = self.place(core::mem::take(&mut intake.groom), space)?;
         if !groom.is_merged(self.shortest_segment) {
             let (merged, losses) = groom.merged(self.shortest_segment)?;
             intake.add(losses);
@@ -124,9 +126,13 @@ impl GroomSettings {
         Ok(())
     }
 
-    /// Brings a groom of a file of this format to metres, Y up, and its origin.
-    pub(super) fn place(&self, groom: Groom, format: GroomFormat) -> Result<Groom, GroomError> {
-        let groom = groom.with_up(self.up_of(format)).scaled(self.scale_of(format))?;
+    /// Brings a groom to metres, Y up, and its origin.
+    pub(super) fn place(
+        &self,
+        groom: Groom,
+        (scale, up): (f32, UpAxis),
+    ) -> Result<Groom, GroomError> {
+        let groom = groom.with_up(up).scaled(scale)?;
         if self.origin == Vec3::ZERO { Ok(groom) } else { groom.moved(-self.origin) }
     }
 
@@ -134,12 +140,18 @@ impl GroomSettings {
         self.nodes.map_or(Ok(groom.clone()), |nodes| groom.resampled(nodes))
     }
 
-    /// Metres per unit of a file of this format.
+    /// Metres per unit and the axis that is up: of the settings, else of the file, else of its format.
+    pub(super) fn scale_and_up_of(&self, intake: &Intake, format: GroomFormat) -> (f32, UpAxis) {
+        let scale = self.scale.or(intake.scale).unwrap_or(format.scale());
+        (scale, self.up.or(intake.up).unwrap_or(format.up()))
+    }
+
+    /// Metres per unit of a file of this format; one of USD may say another.
     pub fn scale_of(&self, format: GroomFormat) -> f32 {
         self.scale.unwrap_or(format.scale())
     }
 
-    /// The axis that is up in a file of this format.
+    /// The axis that is up in a file of this format; one of USD may say another.
     pub fn up_of(&self, format: GroomFormat) -> UpAxis {
         self.up.unwrap_or(format.up())
     }

@@ -315,7 +315,6 @@ fn files_that_are_no_grooms_are_reported_for_what_they_are() {
             "git lfs pull",
         ),
         (b"<!DOCTYPE html><html><body>Not Found</body></html>", "a web page (HTML)"),
-        (b"#usda 1.0\n", "a USD file (text)"),
         (b"\x89HDF\r\n\x1a\n", "Alembic archives of before 2013"),
         (b"version 2.0\nscale 1.0\n", "a text file of TressFX version 2.0"),
         (&4f32.to_be_bytes(), "unknown kind"),
@@ -326,4 +325,10 @@ fn files_that_are_no_grooms_are_reported_for_what_they_are() {
         assert!(!error.contains("expected .hair"), "{error}");
         assert_eq!(GroomFormat::of(file).unwrap_err().to_string(), error);
     }
+    // USD is known, and read with a feature.
+    let usd = b"#usda 1.0\n";
+    let error = Groom::from_file(usd, &default()).unwrap_err().to_string();
+    let is_on = cfg!(feature = "usd");
+    let says = if is_on { "without curves" } else { "turn on the feature `usd`" };
+    assert!(GroomFormat::of(usd) == Ok(GroomFormat::Usd) && error.contains(says), "{error}");
 }

@@ -25,10 +25,7 @@
 //! Each may be one for the set, one a curve or one a point; sets that have none where others do take the mean
 //! of those (zero for UVs, 1 for stiffness).
 
-mod curves;
-mod groups;
 mod ogawa;
-mod params;
 
 #[cfg(test)]
 mod tests;
@@ -37,25 +34,23 @@ mod write;
 pub use write::{write, write_cache};
 
 use super::{
-    Groom, GroomError, GroomFileError, GroomLosses, bytes::value, intake::Intake,
+    Groom, GroomFileError, GroomLosses,
+    bytes::value,
+    curve_sets::{
+        Attributes, COLOR, CurveSet, CurveSets, Curves, GROUP, GROUP_NAME, GUIDE, Kind, Knots,
+        Numbers, Param, ROOT_UV, STIFFNESS, WIDTH,
+    },
+    intake::Intake,
     losses::GroomPlace,
 };
 use bevy::{
-    math::{DAffine3, DMat3, DQuat, DVec3, DVec4},
+    math::{DAffine3, DMat3, DQuat, DVec3},
     prelude::*,
 };
-use curves::{CUBIC, Curve, Curves, Kind};
-use groups::Groups;
 use ogawa::{Children, Compound, EXPORT_AGAIN, Object, Ogawa, Property, Values};
-use params::{
-    COLOR, Column, Counts, GROUP, GROUP_NAME, GUIDE, Param, ROOT_UV, STIFFNESS, WIDTH, first_of,
-    from_the_top,
-};
 
 /// Objects nested deeper are refused.
 const DEEPEST: usize = 256;
-/// So many bytes of the file justify a node, or a strand: sets may share their arrays.
-const BYTES_PER_NODE: usize = 4;
 
 /// A groom from the bytes of an `.abc` file, in the file's own unit and axes, and what was left out.
 ///
@@ -79,17 +74,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
 
 pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     let archive = Ogawa::open(file)?;
-    let reading = Reading::of(&archive, Read::All)?;
-    let Reading { mut groom, widths, colors, uvs, guides, stiffness, groups, losses, .. } = reading;
-    groom.widths = widths.filled(None).into_iter().map(|[width]| width).collect();
-    groom.colors = colors.filled(None).into_iter().map(LinearRgba::from_f32_array).collect();
-    groom.uvs = uvs.filled(Some([0.0; 2])).into_iter().map(Vec2::from_array).collect();
-    groom.stiffness = stiffness.filled(Some([1.0])).into_iter().map(|[share]| share).collect();
-    if groups.is_known || groups.sets > 1 {
-        (groom.groups, groom.all_groups) = (groups.of_strands.into(), groups.all.into());
-    }
-    groom.guides = guides.filled(Some([0.0])).into_iter().map(|[guide]| guide != 0.0).collect();
-    Ok(Intake::cleaned(groom, losses)?)
+    Ok(Reading::of(&archive, Read::All)?.sets.finish()?)
 }
 
 /// The nodes of all curves of a file at the times of its samples (s), whatever numbers they are.
@@ -125,7 +110,7 @@ impl<'a> Motion<'a> {
             1 => 0.0,
             _ => self.archive.time(self.moments.times, frame)?,
         };
-        Ok((time, Reading::of(&self.archive, Read::Nodes)?.groom))
+        Ok((time, Reading::of(&self.archive, Read::Nodes)?.sets.nodes()))
     }
 }
 
@@ -139,16 +124,7 @@ struct Open<'a> {
 
 struct Reading<'a> {
     archive: &'a Ogawa<'a>,
-    /// How many nodes, and strands, the groom may have.
-    limit: usize,
-    groom: Groom,
-    widths: Column<1>,
-    colors: Column<4>,
-    uvs: Column<2>,
-    guides: Column<1>,
-    stiffness: Column<1>,
-    groups: Groups,
-    losses: GroomLosses,
+    sets: CurveSets,
     /// Of what has the most samples of all that moves nodes.
     moments: Moments,
     read: Read,
@@ -161,6 +137,16 @@ enum Read {
     Nodes,
 }
 
+impl Numbers for Values<'_> {
+    fn len(self) -> usize {
+        Values::len(&self)
+    }
+
+    fn get(self, i: usize) -> f64 {
+        Values::get(&self, i)
+    }
+}
+
 fn path_of(open: &[Open<'_>], object: Object<'_>) -> String {
     let above = open.iter().skip(1).map(|open| open.name);
     let path = above.chain([object.name]).fold(String::new(), |path, name| path + "/" + name);
@@ -169,24 +155,12 @@ fn path_of(open: &[Open<'_>], object: Object<'_>) -> String {
 
 impl<'a> Reading<'a> {
     fn of(archive: &'a Ogawa<'a>, read: Read) -> Result<Self, GroomFileError> {
-        let mut reading = Self {
-            archive,
-            limit: archive.len() / BYTES_PER_NODE,
-            groom: Groom::default(),
-            widths: Column::EMPTY,
-            colors: Column::EMPTY,
-            uvs: Column::EMPTY,
-            guides: Column::EMPTY,
-            stiffness: Column::EMPTY,
-            groups: Groups::default(),
-            losses: GroomLosses::default(),
-            moments: Moments { count: 1, times: 0 },
-            read,
-        };
+        let (sets, moments) = (CurveSets::of(archive.len()), Moments { count: 1, times: 0 });
+        let mut reading = Self { archive, sets, moments, read };
         reading.walk()?;
-        if reading.groom.is_empty() {
+        if reading.sets.is_empty() {
             let hint = "export hair curves or particle hair with it, visible";
-            let found = format!("without curves ({})", reading.losses);
+            let found = format!("without curves ({})", reading.sets.losses);
             return value(8, "the archive", found, "one with AbcGeom_Curve", hint);
         }
         Ok(reading)
@@ -217,13 +191,13 @@ impl<'a> Reading<'a> {
             let schema = object.schema();
             if object.is_instance() {
                 let path = format!("{}, an instance", path_of(&open, object));
-                self.losses.skipped_primitives.add(GroomPlace::Part(path));
+                self.sets.losses.skipped_primitives.add(GroomPlace::Part(path));
             } else if schema.starts_with("AbcGeom_Xform") {
                 space = self.transform(archive.find_compound(properties, ".xform")?, space)?;
             } else if schema.starts_with("AbcGeom_Curve") {
                 let path = path_of(&open, object);
                 match hidden {
-                    true => self.losses.hidden_curves.add(GroomPlace::Part(path)),
+                    true => self.sets.losses.hidden_curves.add(GroomPlace::Part(path)),
                     false => {
                         let set = archive.find_compound(properties, ".geom")?;
                         self.curves(set, &space, &path)?;
@@ -231,7 +205,7 @@ impl<'a> Reading<'a> {
                 }
             } else if schema.starts_with("AbcGeom_") && !schema.starts_with("AbcGeom_FaceSet") {
                 let path = path_of(&open, object);
-                self.losses.skipped_primitives.add(GroomPlace::Part(path));
+                self.sets.losses.skipped_primitives.add(GroomPlace::Part(path));
             }
             if open.len() >= DEEPEST {
                 let expected = format!("at most {DEEPEST}");
@@ -307,23 +281,27 @@ impl<'a> Reading<'a> {
         let counts = archive.find_values(set, "nVertices")?;
         let points = positions.map_or(Ok(None), |positions| archive.values(positions))?;
         let (Some(positions), Some(points), Some(counts)) = (positions, points, counts) else {
-            self.losses.empty_curves.add(place());
+            self.sets.losses.empty_curves.add(place());
             return Ok(());
         };
         let (kind, is_closed) = kind_of(archive.find_values(set, "curveBasisAndType")?, path)?;
         let curves = self.curves_of(kind, points, counts, path)?;
         self.moves(positions);
         if let Some(more @ 1..) = positions.samples.checked_sub(1) {
-            self.losses.unread_samples.add_many(more as usize, place());
+            self.sets.losses.unread_samples.add_many(more as usize, place());
         }
         if is_closed {
-            self.losses.opened_loops.add_many(curves.len(), place());
+            self.sets.losses.opened_loops.add_many(curves.len(), place());
         }
-        self.nodes(set, points, curves, (space, path))?;
-        match self.read {
-            Read::All => self.numbers(set, curves, (space, path)),
-            Read::Nodes => Ok(()),
-        }
+        let attributes = match self.read {
+            Read::All => self.attributes(set, &curves, path)?,
+            Read::Nodes => Attributes::default(),
+        };
+        let find = |name| archive.find_values(set, name);
+        let (weights, orders) = (find("w")?, find(".orders")?);
+        let knots = find(".knots")?.map_or(Knots::Clamped, Knots::Given);
+        let set = CurveSet { curves, points, weights, orders, knots, space, path };
+        Ok(self.sets.add(&set, &attributes)?)
     }
 
     /// The curves of a set, whose counts fit its points.
@@ -333,141 +311,53 @@ impl<'a> Reading<'a> {
         points: Values<'a>,
         counts: Values<'a>,
         path: &str,
-    ) -> Result<Curves<'a>, GroomFileError> {
+    ) -> Result<Curves, GroomFileError> {
         let found = points.len() / 3;
-        let all: f64 = counts.iter().sum();
-        if all != found as f64 || counts.iter().any(|count| count < 0.0) {
-            let found = format!("{found} in {path}");
-            let expected = format!("{all}, the sum of nVertices, each 0 or more");
-            return value(points.at, "the count of points", found, expected, EXPORT_AGAIN);
-        }
-        let (nodes, strands) = (self.groom.points.len() + found, self.groom.len() + counts.len());
-        if nodes.max(strands) > self.limit {
-            let found = format!("{} in {path}", nodes.max(strands));
-            let expected = format!("at most {}, as the file's size justifies", self.limit);
+        if let Some(most) = self.sets.beyond(found, counts.len()) {
+            let found = format!("{most} in {path}");
+            let expected = format!("at most {}, as the file's size justifies", self.sets.limit);
             let hint = "apply instances before the export";
             return value(points.at, "the count of nodes and strands", found, expected, hint);
         }
-        Ok(Curves { kind, counts })
-    }
-
-    fn nodes(
-        &mut self,
-        set: Compound<'a>,
-        points: Values<'a>,
-        curves: Curves<'a>,
-        (space, path): (&DAffine3, &str),
-    ) -> Result<(), GroomFileError> {
-        let find = |name| self.archive.find_values(set, name);
-        let (weights, orders, all_knots) = (find("w")?, find(".orders")?, find(".knots")?);
-        let weights = weights.filter(|weights| weights.len() == points.len() / 3);
-        let orders = orders.filter(|orders| orders.len() == curves.len());
-        let wanted = |curve: Curve| orders.map_or(CUBIC, |o| o.get(curve.index) as usize);
-        let point = |i: usize| {
-            space.transform_point3(DVec3::from_array([0, 1, 2].map(|k| points.get(3 * i + k))))
-        };
-        let (mut controls, mut weighted, mut knots) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut next_knot, mut bad_knots) = (0_usize, 0);
-        for curve in curves.iter() {
-            let nodes = 0..curve.nodes;
-            let (wanted, first_knot) = (wanted(curve), next_knot);
-            next_knot = first_knot.saturating_add(curve.count).saturating_add(wanted);
-            let made = &mut self.groom.points;
-            match curves.kind {
-                Kind::Joined => made.extend(curve.points().map(|i| point(i).as_vec3())),
-                Kind::Bezier => {
-                    controls.clear();
-                    controls.extend(curve.points().map(point));
-                    made.extend(nodes.map(|node| curves::bezier(&controls, node).as_vec3()));
-                }
-                Kind::Spline if curve.nodes > 1 => {
-                    let weight = |i| weights.map_or(1.0, |weights| weights.get(i));
-                    let control = |i| DVec4::from((point(i) * weight(i), weight(i)));
-                    weighted.clear();
-                    weighted.extend(curve.points().map(control));
-                    let count = weighted.len();
-                    let order = curves::order_of(wanted, count);
-                    knots.clear();
-                    if let Some(all) = all_knots {
-                        let last_knot = first_knot.saturating_add(count + order);
-                        knots.extend((first_knot..last_knot).map(|i| all.get(i)));
-                        bad_knots += usize::from(!curves::are_knots(&knots, count, order));
-                    }
-                    if !curves::are_knots(&knots, count, order) {
-                        curves::clamped_knots(count, order, &mut knots);
-                    }
-                    let node = |node| curves::spline(&weighted, order, &knots, node).as_vec3();
-                    made.extend(nodes.map(node));
-                }
-                Kind::Spline => made.extend(curve.points().map(|i| point(i).as_vec3())),
-            }
-            let found = made.len();
-            let end = u32::try_from(found).map_err(|_| GroomError::TooMany { found })?;
-            self.groom.ends.push(end);
-        }
-        if bad_knots > 0 {
-            let part = format!("{path}.knots: of {bad_knots} curves, which have even ones instead");
-            self.losses.broken_arrays.add(GroomPlace::Part(part));
-        }
-        Ok(())
+        Curves::of(kind, counts, found).or_else(|sum| {
+            let found = format!("{found} in {path}");
+            let expected = format!("{sum}, the sum of nVertices, each 0 or more");
+            value(points.at, "the count of points", found, expected, EXPORT_AGAIN)
+        })
     }
 
     /// The optional numbers of a set.
-    fn numbers(
+    fn attributes(
         &mut self,
         set: Compound<'a>,
-        curves: Curves<'a>,
-        (space, path): (&DAffine3, &str),
-    ) -> Result<(), GroomFileError> {
+        curves: &Curves,
+        path: &str,
+    ) -> Result<Attributes<'a, Values<'a>>, GroomFileError> {
         let archive = self.archive;
         let own = archive.find_compound(set, ".arbGeomParams")?;
-        let sum = |of: fn(Curve) -> usize| curves.iter().map(of).sum();
-        let counts = Counts {
-            curves: curves.len(),
-            points: sum(|curve| curve.count),
-            anchors: sum(|curve| curve.anchors),
+        let first_of = |among: [(Compound<'a>, &str); 2]| {
+            let [first, second] = among.map(|(compound, name)| archive.find(compound, name));
+            Ok::<_, GroomFileError>(first?.or(second?))
         };
-        let nodes = sum(|curve| curve.nodes);
-        let each = || curves.iter().flat_map(|c| (0..c.nodes).map(move |node| (c, node)));
-
-        let width = first_of(archive, &[(own, WIDTH), (set, "width")])?;
-        let width = self.param::<1>(width, counts, path);
-        let scale = space.matrix3.determinant().abs().cbrt() as f32;
-        let width = width.as_ref().map(|width| {
-            each().map(move |(curve, node)| width.at(curve, node).map(|width| width * scale))
-        });
-        self.widths.add(nodes, width);
-
-        let color = first_of(archive, &[(own, COLOR), (own, "Cd")])?;
-        match color.is_some_and(|color| color.extent() == 4) {
-            true => {
-                let color = self.param::<4>(color, counts, path);
-                let color = color.as_ref().map(|color| each().map(|(c, node)| color.at(c, node)));
-                self.colors.add(nodes, color);
-            }
-            false => {
-                let color = self.param::<3>(color, counts, path);
-                let color = color.as_ref().map(|color| each().map(|(c, node)| color.at(c, node)));
-                self.colors.add(nodes, color.map(|color| color.map(|[r, g, b]| [r, g, b, 1.0])));
-            }
-        }
-        let uv = first_of(archive, &[(own, ROOT_UV), (set, "uv")])?;
-        let uv = self.param::<2>(uv, counts, path);
-        let uv = uv.as_ref().map(|uv| curves.iter().map(|curve| from_the_top(uv.at(curve, 0))));
-        self.uvs.add(curves.len(), uv);
-        let guide = self.param::<1>(archive.find(own, GUIDE)?, counts, path);
-        let guide = guide.as_ref().map(|guide| curves.iter().map(|curve| guide.at(curve, 0)));
-        self.guides.add(curves.len(), guide);
-        let own_share = self.param::<1>(archive.find(own, STIFFNESS)?, counts, path);
-        let own_share = own_share.as_ref().map(|of| curves.iter().map(|curve| of.at(curve, 0)));
-        self.stiffness.add(curves.len(), own_share);
-        let id = self.param::<1>(archive.find(own, GROUP)?, counts, path);
+        let widths = first_of([(own, WIDTH), (set, "width")])?;
+        let colors = first_of([(own, COLOR), (own, "Cd")])?;
+        let given = if colors.is_some_and(|color| color.extent() == 4) { 4 } else { 3 };
+        let uvs = first_of([(own, ROOT_UV), (set, "uv")])?;
         let names = archive.find(own, GROUP_NAME)?;
-        let names = names.map_or(Ok(Vec::new()), |names| archive.texts(names, counts.curves))?;
-        let id = |curve| id.as_ref().map(|id| id.at(curve, 0)[0] as i32);
-        self.groups.add(curves.iter().map(|curve| (id(curve), curve.index)), &names, path);
-
-        let losses = &mut self.losses;
+        let names = names.map_or(Ok(Vec::new()), |names| archive.texts(names, curves.len()))?;
+        let mut one =
+            |name| Ok::<_, GroomFileError>(self.param(archive.find(own, name)?, 1, curves, path));
+        let (guides, stiffness, groups) = (one(GUIDE)?, one(STIFFNESS)?, one(GROUP)?);
+        let attributes = Attributes {
+            widths: self.param(widths, 1, curves, path),
+            colors: self.param(colors, given, curves, path),
+            uvs: self.param(uvs, 2, curves, path),
+            guides,
+            stiffness,
+            groups,
+            group_names: names,
+        };
+        let losses = &mut self.sets.losses;
         let mut unread = |name: &str| {
             losses.unread_arrays.add(GroomPlace::Part(format!("{path}.{name}")));
         };
@@ -484,23 +374,42 @@ impl<'a> Reading<'a> {
                 unread(name);
             }
         }
-        Ok(())
+        Ok(attributes)
     }
 
-    /// An array that a set can do without: `None`, and counted, if it cannot be read.
+    /// An array that a set can do without, `given` numbers to an element: `None`, and counted, if it cannot be read.
     fn param<const N: usize>(
         &mut self,
         property: Option<Property<'a>>,
-        counts: Counts,
+        given: usize,
+        curves: &Curves,
         path: &str,
-    ) -> Option<Param<'a, N>> {
+    ) -> Option<Param<Values<'a>, N>> {
         let property = property?;
-        Param::of(self.archive, property, counts).unwrap_or_else(|wrong| {
+        let text = |error: GroomFileError| error.to_string();
+        let arrays = arrays_of(self.archive, property).map_err(text);
+        let param = arrays.and_then(|(values, indices)| {
+            let of = |values| Param::of(values, indices, given, curves);
+            values.map(of).transpose()
+        });
+        param.unwrap_or_else(|wrong| {
             let part = format!("{path}.{}: {wrong}", property.name);
-            self.losses.broken_arrays.add(GroomPlace::Part(part));
+            self.sets.losses.broken_arrays.add(GroomPlace::Part(part));
             None
         })
     }
+}
+
+/// The values of a property and the indices into them, as far as there are any.
+fn arrays_of<'a>(
+    archive: &Ogawa<'a>,
+    property: Property<'a>,
+) -> Result<(Option<Values<'a>>, Option<Values<'a>>), GroomFileError> {
+    if !property.is_compound() {
+        return Ok((archive.values(property)?, None));
+    }
+    let inside = archive.inside(property)?;
+    Ok((archive.find_values(inside, ".vals")?, archive.find_values(inside, ".indices")?))
 }
 
 /// Attributes that are read …

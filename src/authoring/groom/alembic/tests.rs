@@ -1,8 +1,10 @@
 //! Archives written here: transforms, types, attributes, and everything that can be wrong.
 
 use super::{
-    super::{GroomCache, GroomFormat, GroomGroup, GroomSettings, GroomStrand, UpAxis},
-    params::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH},
+    super::{
+        GroomCache, GroomError, GroomFormat, GroomGroup, GroomSettings, GroomStrand, UpAxis,
+        curve_sets::{BYTES_PER_NODE, COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH},
+    },
     write::{Archive, Pod, Written, floats},
     *,
 };

@@ -1,7 +1,9 @@
 //! Writes Alembic archives.
 
-use super::params::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, from_the_top};
-use crate::authoring::groom::{Groom, GroomCache, GroomError, GroomGroup};
+use crate::authoring::groom::{
+    Groom, GroomCache, GroomError, GroomGroup,
+    curve_sets::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, from_the_top},
+};
 use bevy::prelude::*;
 
 const DATA: u64 = 1 << 63;

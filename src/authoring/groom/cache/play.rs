@@ -1,6 +1,6 @@
 //! Hair that a cache moves in place of the tick.
 
-use super::GroomCache;
+use super::motion::GroomCache;
 use crate::{
     authoring::groom::reshape::{arc_lengths, place},
     base::{

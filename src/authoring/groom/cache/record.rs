@@ -1,6 +1,6 @@
 //! Recording hair, tick by tick.
 
-use super::{GroomCache, GroomCacheError};
+use super::{error::GroomCacheError, motion::GroomCache};
 use crate::{
     authoring::groom::{Groom, GroomError},
     base::{

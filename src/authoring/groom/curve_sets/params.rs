@@ -1,10 +1,6 @@
 //! Optional numbers of curve sets: one for all, one a curve, a point or an anchor.
 
-use super::{
-    curves::Curve,
-    ogawa::{Compound, Ogawa, Property, Values},
-};
-use crate::authoring::groom::GroomFileError;
+use super::curves::{Curve, Curves, Numbers};
 use core::ops::Range;
 
 /// Attributes that Unreal Engine names.
@@ -18,65 +14,55 @@ pub const GROUP_NAME: &str = "groom_group_name";
 pub const STIFFNESS: &str = "groom_stiffness";
 
 /// The numbers of one property, N to an element.
-pub struct Param<'a, const N: usize> {
-    values: Values<'a>,
-    indices: Option<Values<'a>>,
+pub struct Param<V, const N: usize> {
+    values: V,
+    indices: Option<V>,
+    /// How many the file has to an element; what is missing is 1.
+    given: usize,
     scope: Scope,
 }
 
-/// What has an element of its own. Recognised by their number: Blender does not write it.
+/// What has an element of its own. Recognised by their number: Blender does not write it into Alembic.
 #[derive(Clone, Copy)]
 enum Scope {
     Set,
     Curve,
     Point,
     Anchor,
+    /// All points but the outermost two: ends of segments of an open cubic curve.
+    Inner,
 }
 
-/// How many there are in a set.
-#[derive(Clone, Copy)]
-pub struct Counts {
-    pub curves: usize,
-    pub points: usize,
-    pub anchors: usize,
-}
-
-impl<'a, const N: usize> Param<'a, N> {
-    /// The numbers of a property, `None` if it has none.
+impl<V: Numbers, const N: usize> Param<V, N> {
+    /// Numbers, `given` to an element, of these curves.
     ///
     /// # Errors
     /// What is wrong with them.
     pub fn of(
-        archive: &Ogawa<'a>,
-        property: Property<'a>,
-        counts: Counts,
-    ) -> Result<Option<Self>, String> {
-        let text = |error: GroomFileError| error.to_string();
-        let (values, indices) = match property.is_compound() {
-            false => (archive.values(property).map_err(text)?, None),
-            true => {
-                let inside = archive.inside(property).map_err(text)?;
-                let values = archive.find_values(inside, ".vals").map_err(text)?;
-                (values, archive.find_values(inside, ".indices").map_err(text)?)
-            }
-        };
-        let Some(values) = values else {
-            return Ok(None);
-        };
-        let elements = values.len() / N;
-        if indices.is_some_and(|indices| indices.iter().any(|i| i >= elements as f64)) {
+        values: V,
+        indices: Option<V>,
+        given: usize,
+        curves: &Curves,
+    ) -> Result<Self, String> {
+        let elements = values.len() / given;
+        let is_inside = |i: f64| (0.0..elements as f64).contains(&i);
+        if indices.is_some_and(|of| !(0..of.len()).all(|i| is_inside(of.get(i)))) {
             return Err(format!("an index beyond its {elements} values"));
         }
         let found = indices.map_or(elements, |indices| indices.len());
-        let Counts { curves, points, anchors } = counts;
+        let sum = |of: fn(Curve) -> usize| curves.iter().map(of).sum::<usize>();
+        let (all, points) = (curves.len(), sum(|curve| curve.count));
         let scope = match found {
-            all if all == points => Scope::Point,
-            all if all == curves => Scope::Curve,
+            found if found == points => Scope::Point,
+            found if found == all => Scope::Curve,
             1 => Scope::Set,
-            all if all == anchors => Scope::Anchor,
-            _ => return Err(format!("{found} values, expected 1, {curves} or {points}")),
+            found if found == sum(|curve| curve.anchors) => Scope::Anchor,
+            found if found + 2 * all == points && curves.iter().all(|c| c.count > 2) => {
+                Scope::Inner
+            }
+            _ => return Err(format!("{found} values, expected 1, {all} or {points}")),
         };
-        Ok(Some(Self { values, indices, scope }))
+        Ok(Self { values, indices, given, scope })
     }
 
     /// At a node of a curve.
@@ -85,6 +71,10 @@ impl<'a, const N: usize> Param<'a, N> {
             Scope::Set => self.element(0),
             Scope::Curve => self.element(curve.index),
             Scope::Point => self.element(curve.first_point + node),
+            Scope::Inner => {
+                let first = curve.first_point - 2 * curve.index;
+                self.element(first + node.clamp(1, curve.count - 2) - 1)
+            }
             Scope::Anchor => {
                 let anchor = curve.first_anchor + node / 3;
                 let (from, to) = (self.element(anchor), self.element(anchor + 1));
@@ -99,21 +89,9 @@ impl<'a, const N: usize> Param<'a, N> {
     fn element(&self, i: usize) -> [f32; N] {
         // `as` saturates, and indices are checked.
         let i = self.indices.map_or(i, |indices| indices.get(i) as usize);
-        core::array::from_fn(|k| self.values.get(N * i + k) as f32)
+        let number = |k: usize| self.values.get(self.given * i + k) as f32;
+        core::array::from_fn(|k| if k < self.given { number(k) } else { 1.0 })
     }
-}
-
-/// The first of these properties that there is.
-pub fn first_of<'a>(
-    archive: &Ogawa<'a>,
-    among: &[(Compound<'a>, &'static str)],
-) -> Result<Option<Property<'a>>, GroomFileError> {
-    for (compound, name) in among {
-        if let Some(found) = archive.find(*compound, name)? {
-            return Ok(Some(found));
-        }
-    }
-    Ok(None)
 }
 
 /// An optional array of a groom, filled set by set.
@@ -164,7 +142,7 @@ impl<const N: usize> Column<N> {
     }
 }
 
-/// V counts from the bottom of an image in Alembic, from the top in Bevy's meshes.
+/// V counts from the bottom of an image in Alembic and USD, from the top in Bevy's meshes.
 pub fn from_the_top([u, v]: [f32; 2]) -> [f32; 2] {
     [u, 1.0 - v]
 }

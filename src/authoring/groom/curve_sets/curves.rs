@@ -1,6 +1,5 @@
-//! Curves of Alembic as the nodes of strands.
+//! Curves as the nodes of strands.
 
-use super::ogawa::Values;
 use bevy::math::{DVec3, DVec4};
 use core::ops::Range;
 
@@ -8,6 +7,14 @@ use core::ops::Range;
 const MOST_ORDER: usize = 16;
 /// That of a cubic curve.
 pub const CUBIC: usize = 4;
+
+/// An array of numbers, of whatever type a file has.
+pub trait Numbers: Copy {
+    fn len(self) -> usize;
+
+    /// One of them; NaN beyond the last.
+    fn get(self, i: usize) -> f64;
+}
 
 /// How the points of a set become nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,22 +65,34 @@ impl Curve {
 }
 
 /// The curves of a set.
-#[derive(Clone, Copy)]
-pub struct Curves<'a> {
+#[derive(Clone, Debug)]
+pub struct Curves {
     pub kind: Kind,
     /// Points of each.
-    pub counts: Values<'a>,
+    counts: Vec<usize>,
 }
 
-impl Curves<'_> {
+impl Curves {
+    /// Curves of as many points each, `points` together.
+    ///
+    /// # Errors
+    /// The sum, if it is another one or a count is negative.
+    pub fn of(kind: Kind, counts: impl Numbers, points: usize) -> Result<Self, f64> {
+        let each = || (0..counts.len()).map(|i| counts.get(i));
+        let sum: f64 = each().sum();
+        if sum != points as f64 || each().any(|count| count < 0.0) {
+            return Err(sum);
+        }
+        Ok(Self { kind, counts: each().map(|count| count as usize).collect() })
+    }
+
     pub fn len(&self) -> usize {
         self.counts.len()
     }
 
     pub fn iter(&self) -> impl Iterator<Item = Curve> {
         let (mut first_point, mut first_anchor) = (0, 0);
-        self.counts.iter().enumerate().map(move |(index, count)| {
-            let count = count as usize;
+        self.counts.iter().enumerate().map(move |(index, &count)| {
             let (anchors, nodes) = (self.kind.anchors(count), self.kind.nodes(count));
             let curve = Curve { index, count, first_point, anchors, first_anchor, nodes };
             first_point += count;
@@ -110,6 +129,12 @@ pub fn clamped_knots(points: usize, order: usize, knots: &mut Vec<f64>) {
     let last = points - order + 1;
     knots.clear();
     knots.extend((0..points + order).map(|i| (i + 1).saturating_sub(order).min(last) as f64));
+}
+
+/// Even knots of a curve that ends before its outermost points.
+pub fn even_knots(points: usize, order: usize, knots: &mut Vec<f64>) {
+    knots.clear();
+    knots.extend((0..points + order).map(|i| i as f64));
 }
 
 /// Whether these can be knots of a curve.
