@@ -82,7 +82,7 @@ fn tie(
             commands.trigger(HairTied { hair, tie, strands: 0, too_short: 0 });
         }
         for member in taken {
-            commands.entity(member).insert((Tied(tie), TieProgress::default()));
+            commands.entity(member).try_insert((Tied(tie), TieProgress::default()));
         }
     }
 }

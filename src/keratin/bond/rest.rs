@@ -23,6 +23,7 @@ pub struct RestShape {
     pub(super) closed: bool,
     /// The softening that the stiffness was computed with, and the strand's own share.
     pub(super) softened: Vec<f32>,
+    #[reflect(ignore)]
     pub(super) share: f32,
 }
 

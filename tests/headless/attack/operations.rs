@@ -284,7 +284,7 @@ fn write(world: &mut World, entity: Entity, may_go: bool, random: &mut Random) -
         .filter(|t| t.type_info().type_path().starts_with("bevy_keratin"))
         // Relationships are immutable, and the ledger belongs to the tick.
         .filter(|t| {
-            !["StrandOf", "WoundOn", "WaterLedger"]
+            !["StrandOf", "WoundOn", "Tied", "WaterLedger"]
                 .contains(&t.type_info().type_path_table().ident().unwrap_or_default())
         })
         .filter_map(|t| Some((t.type_info().type_path(), t.data::<ReflectComponent>()?)))

@@ -125,11 +125,12 @@ fn begin(
         .collect();
     for (hair, wanted, playback, regroomed, members) in &mut hairs {
         let Some(mut playback) = playback else {
-            commands.entity(hair).insert(Playback::default());
+            commands.entity(hair).try_insert(Playback::default());
             continue;
         };
         let id = wanted.cache.id();
-        if wanted.is_changed() && ![wanted.time, wanted.speed].iter().all(|n| n.is_finite()) {
+        let is_new = wanted.is_changed() || playback.is_added();
+        if is_new && ![wanted.time, wanted.speed].iter().all(|n| n.is_finite()) {
             let message = format!(
                 "PlayGroomCache has time {} s and speed {}, expected finite numbers: 0 is taken",
                 wanted.time, wanted.speed
@@ -163,7 +164,7 @@ fn begin(
         playback.strands = matched(cache, &own);
         (playback.cache, playback.reported) = (id, false);
         if !playback.strands.is_empty() {
-            commands.entity(hair).insert(PlayedHair).remove::<Settling>();
+            commands.entity(hair).try_insert(PlayedHair).try_remove::<Settling>();
         }
     }
 }
