@@ -122,7 +122,7 @@ struct Arguments {
     #[command(flatten)]
     swing: swing::Options,
     #[command(flatten)]
-    replay: replay::Options,
+    replay: replay::Replay,
 }
 
 fn solver(name: &str) -> Result<SolverMethod, String> {
@@ -196,7 +196,10 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
         Show::Worlds => return table(worlds::rows(), arguments.json),
         Show::Rods => return rods(arguments),
         Show::Characters => return characters(arguments),
-        Show::Replay => return arguments.replay.run(arguments.seconds, arguments.json),
+        Show::Replay => {
+            let pools = pools(arguments.threads);
+            return arguments.replay.run(arguments.seconds, pools, arguments.json);
+        }
     };
     if arguments.swing.any() {
         return Err(
@@ -319,11 +322,10 @@ fn present(app: &mut App) {
     let _ = app;
 }
 
-/// Exactly one tick an update, on as many threads as asked for.
-fn headless_app(scene: Scene, arguments: &Arguments, droplets: Strewn) -> App {
-    // The thread that runs the app solves strands too, next to those of the pool.
+/// So many threads that solve strands. That which runs the app does, too, next to those of the pool.
+fn pools(threads: Option<u16>) -> TaskPoolOptions {
     let mut pools = TaskPoolOptions::default();
-    if let Some(threads) = arguments.threads {
+    if let Some(threads) = threads {
         let count = usize::from(threads - 1);
         pools.compute = TaskPoolThreadAssignmentPolicy {
             min_threads: count,
@@ -333,6 +335,12 @@ fn headless_app(scene: Scene, arguments: &Arguments, droplets: Strewn) -> App {
             on_thread_destroy: None,
         };
     }
+    pools
+}
+
+/// Exactly one tick an update, on as many threads as asked for.
+fn headless_app(scene: Scene, arguments: &Arguments, droplets: Strewn) -> App {
+    let pools = pools(arguments.threads);
     let mut app = App::new();
     if arguments.gpu {
         #[cfg(feature = "gpu")]

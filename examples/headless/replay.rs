@@ -3,7 +3,11 @@
 //! `-- --scene replay --seed 7 --seconds 20 --write run.log`, then `-- --scene replay --read run.log`
 
 use crate::report::state_hash;
-use bevy::{app::TaskPoolPlugin, prelude::*, time::TimeUpdateStrategy};
+use bevy::{
+    app::{TaskPoolOptions, TaskPoolPlugin},
+    prelude::*,
+    time::TimeUpdateStrategy,
+};
 use bevy_keratin::prelude::*;
 use clap::Args;
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -22,7 +26,8 @@ const NODES: usize = 12;
 const RADIUS: f32 = 0.09;
 
 #[derive(Args)]
-pub struct Options {
+#[group(id = "replay")]
+pub struct Replay {
     /// Where the inputs of a replay come from.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -34,7 +39,7 @@ pub struct Options {
     read: Option<PathBuf>,
 }
 
-impl Options {
+impl Replay {
     pub fn any(&self) -> bool {
         self.write.is_some() || self.read.is_some()
     }
@@ -123,8 +128,13 @@ struct Outcome {
     tips_off: Vec<f32>,
 }
 
-impl Options {
-    pub fn run(&self, seconds: Option<f32>, json: bool) -> Result<(), Box<dyn std::error::Error>> {
+impl Replay {
+    pub fn run(
+        &self,
+        seconds: Option<f32>,
+        pools: TaskPoolOptions,
+        json: bool,
+    ) -> Result<(), Box<dyn std::error::Error>> {
         let outcome = match (&self.write, &self.read) {
             (Some(path), None) => {
                 let seconds = seconds.unwrap_or(20.0);
@@ -133,11 +143,11 @@ impl Options {
                 }
                 let at = |error| format!("--write {} cannot be written: {error}", path.display());
                 let file = File::create(path).map_err(at)?;
-                write(self.seed, (seconds * HERTZ as f32) as u64, BufWriter::new(file))?
+                write(self.seed, (seconds * HERTZ as f32) as u64, pools, BufWriter::new(file))?
             }
             (None, Some(path)) => {
                 let at = |error| format!("--read {} cannot be read: {error}", path.display());
-                read(BufReader::new(File::open(path).map_err(at)?))?
+                read(BufReader::new(File::open(path).map_err(at)?), pools)?
             }
             _ => return Err("--scene replay needs one of --write LOG and --read LOG".into()),
         };
@@ -164,6 +174,7 @@ fn instructions() -> String {
 fn write(
     seed: u64,
     ticks: u64,
+    pools: TaskPoolOptions,
     mut log: impl Write,
 ) -> Result<Outcome, Box<dyn std::error::Error>> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -173,7 +184,7 @@ fn write(
         Ok(log.write_all(b"\n")?)
     };
     line(&Line::Start { version: VERSION, seed, ticks, instructions: instructions.clone() })?;
-    let (mut run, mut inputs) = (Run::new(), 0);
+    let (mut run, mut inputs) = (Run::new(pools), 0);
     for tick in 0..ticks {
         // About two a second.
         if random.random_range(0..30) == 0 {
@@ -203,7 +214,7 @@ fn write(
     })
 }
 
-fn read(log: impl BufRead) -> Result<Outcome, Box<dyn std::error::Error>> {
+fn read(log: impl BufRead, pools: TaskPoolOptions) -> Result<Outcome, Box<dyn std::error::Error>> {
     let mut lines = log.lines().enumerate().map(|(number, line)| {
         let text = line.map_err(|error| format!("line {}: {error}", number + 1))?;
         serde_json::from_str::<Line>(&text)
@@ -230,7 +241,7 @@ fn read(log: impl BufRead) -> Result<Outcome, Box<dyn std::error::Error>> {
         differs_after_seconds: None,
         tips_off: Vec::new(),
     };
-    let mut run = Run::new();
+    let mut run = Run::new(pools);
     for tick in 0..ticks {
         while let Some(Line::Input { input, .. }) =
             lines.next_if(|line| matches!(line, Line::Input { tick: at, .. } if *at == tick))
@@ -278,9 +289,10 @@ struct Moves {
 }
 
 impl Run {
-    fn new() -> Self {
+    fn new(pools: TaskPoolOptions) -> Self {
         let mut app = App::new();
-        app.add_plugins((MinimalPlugins.set(TaskPoolPlugin::default()), HairPlugins::default()))
+        let bevy = MinimalPlugins.set(TaskPoolPlugin { task_pool_options: pools });
+        app.add_plugins((bevy, HairPlugins::default()))
             .insert_resource(Time::<Fixed>::from_hz(HERTZ))
             .insert_resource(TimeUpdateStrategy::FixedTimesteps(1))
             .add_systems(FixedUpdate, moving);

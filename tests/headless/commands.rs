@@ -83,3 +83,36 @@ fn without_a_display_there_is_a_sentence_and_no_panic() {
     }
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+#[test]
+fn a_run_that_was_logged_is_replayed_to_the_bit() {
+    let folder = std::env::temp_dir().join(format!("bevy_keratin-replay-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let [log, other] = ["run.log", "other.log"].map(|name| folder.join(name));
+    let [log, other] = [&log, &other].map(|path| path.to_str().unwrap());
+    fn replay<'a>(more: &[&'a str]) -> Vec<&'a str> {
+        [&["--scene", "replay", "--json"], more].concat()
+    }
+    let out = run("headless", &replay(&["--seed", "5", "--seconds", "4", "--write", log]));
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    for threads in ["1", "3"] {
+        let out = run("headless", &replay(&["--read", log, "--threads", threads]));
+        let text = String::from_utf8(out.stdout).unwrap();
+        assert!(out.status.success() && text.contains("\"equal\":true"), "{text}");
+    }
+    // Another input is another run.
+    let text = std::fs::read_to_string(log).unwrap();
+    let input = text.lines().find(|line| line.starts_with("{\"Input\"")).expect("an input");
+    let (tick, _) = input.split_once(",\"input\"").unwrap();
+    let moved = text.replacen(input, &format!("{tick},\"input\":\"Wet\"}}}}"), 1);
+    assert_ne!(moved, text);
+    std::fs::write(other, moved).unwrap();
+    let says = error("headless", &replay(&["--read", other]));
+    assert!(says.contains("differs from its log"), "{says}");
+    std::fs::write(other, &text[..text.len() / 2]).unwrap();
+    let says = error("headless", &replay(&["--read", other]));
+    assert!(says.contains("write the log again") || says.contains("it was cut off"), "{says}");
+    let says = error("headless", &replay(&[]));
+    assert!(says.contains("--write LOG and --read LOG"), "{says}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
