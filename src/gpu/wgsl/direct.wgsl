@@ -374,23 +374,21 @@ fn finish(stage: Stage) {
         let t = tangent(q);
         let k = joint_of(length_before, props.x, props.y);
         let rest_q = rest_shape(i - 1u);
-        var joint = vec4(0.0);
-        if record.torsion == 1.0 {
-            let elastic = moment(q_before, q, rest_q, k, record.torsion);
-            joint = vec4(-dot(elastic, t_before), dot(elastic, t), k, -k * dot(t, t_before));
-        } else {
-            joint = k * twist_derivatives(q_before, q, rest_q, record.torsion);
+        let elastic = moment(q_before, q, rest_q, k, record.torsion);
+        var stiffness = vec2(1.0, -dot(t, t_before));
+        if record.torsion != 1.0 {
+            stiffness = twist_stiffness(q_before, q, rest_q, record.torsion);
         }
         if i > 1u {
-            moment_before += joint.x;
-            turns = eliminated(turns, coupling_before, k_before + joint.z, -moment_before, 1e-30);
+            moment_before -= dot(elastic, t_before);
+            turns = eliminated(turns, coupling_before, k_before + k * stiffness.x, -moment_before, 1e-30);
             note_twist(i - 2u, turns);
         }
-        coupling_before = joint.w;
-        moment_before = joint.y;
+        coupling_before = k * stiffness.y;
+        moment_before = dot(elastic, t);
         q_before = q;
         t_before = t;
-        k_before = joint.z;
+        k_before = k * stiffness.x;
         length_before = props.x;
     }
     turns = eliminated(turns, coupling_before, k_before, -moment_before, 1e-30);

@@ -95,18 +95,13 @@ fn twist_of(before: vec4<f32>, q: vec4<f32>, rest: vec4<f32>) -> vec4<f32> {
     return vec4(w, z, max(fma(w, w, z * z), 1e-12), max(fma(rest.w, rest.w, rest.z * rest.z), 1e-12));
 }
 
-// Derivatives of a joint's energy, over K, by the rotations of its edges about their tangents: first of the edge
-// before and of the one behind it, second on the diagonal and off it. At rest exact, elsewhere what bounds them.
-fn twist_derivatives(before: vec4<f32>, q: vec4<f32>, rest: vec4<f32>, torsion: f32) -> vec4<f32> {
-    let joint = product(conjugate(before), q);
-    let nearer = select(2.0, -2.0, dot(joint, rest) < 0.0);
-    let bends = fma(joint.y, rest.x, -(joint.x * rest.y)) * nearer;
-    let twists = fma(joint.w, rest.z, -(joint.z * rest.w)) * nearer * torsion;
-    let square = fma(joint.w, joint.w, joint.z * joint.z);
-    let rest_square = fma(rest.w, rest.w, rest.z * rest.z);
-    let twist = sqrt(square * rest_square) * torsion;
-    let bend = sqrt(max(1.0 - square, 0.0) * max(1.0 - rest_square, 0.0));
-    return vec4(twists - bends, -(twists + bends), bend + twist, bend - twist);
+// Second derivatives of a joint's energy, over K, by the rotations of its edges about their tangents: on the
+// diagonal and off it. At rest exact, elsewhere what bounds them.
+fn twist_stiffness(before: vec4<f32>, q: vec4<f32>, rest: vec4<f32>, torsion: f32) -> vec2<f32> {
+    let joint = twist_of(before, q, rest);
+    let twist = sqrt(joint.z * joint.w) * torsion;
+    let bend = sqrt(max(1.0 - joint.z, 0.0) * max(1.0 - joint.w, 0.0));
+    return vec2(bend + twist, bend - twist);
 }
 
 // q e3.

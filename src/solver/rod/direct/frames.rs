@@ -131,52 +131,22 @@ impl<R: Real> Twist<R> {
     }
 }
 
-/// Derivatives of a joint's energy, over K, with respect to the rotations of its edges about their tangents.
-pub(super) struct TwistDerivatives<R> {
-    /// First, of the edge before the joint and of the one behind it: [`moment`] along either's tangent.
-    pub before: R,
-    pub behind: R,
-    /// Second, on the diagonal and off it. At rest exact, elsewhere an upper bound, so that Newton steps do not
-    /// overshoot: −K t·t′ in its place is too little for curls that are pulled straight, which bend less than they do
-    /// at rest.
-    pub diagonal: R,
-    pub off: R,
-}
-
-impl<R: Real> TwistDerivatives<R> {
-    /// A rotation about the tangent multiplies Q by 1 + ½α e3, from the left by 1 − ½α e3 if it is that of the edge
-    /// before: g stays, and so does what bends are long.
-    #[inline(always)]
-    pub(super) fn new(
-        before: Quaternion<R>,
-        q: Quaternion<R>,
-        rest: Quaternion<R>,
-        torsion: &Torsion<R>,
-    ) -> Self {
-        let joint = before.conjugate().product(q);
-        let (one, zero) = (joint.w.lit(1.0), joint.w.lit(0.0));
-        let two = joint.w.lit(2.0);
-        let two_signed = R::select(joint.dot(rest).lt(zero), -two, two);
-        let bends = joint.v.y.mul_add(rest.v.x, -(joint.v.x * rest.v.y)) * two_signed;
-        let twists = joint.w.mul_add(rest.v.z, -(joint.v.z * rest.w)) * two_signed * torsion.ratio;
-        let square = joint.w.mul_add(joint.w, joint.v.z * joint.v.z);
-        let rest_square = rest.w.mul_add(rest.w, rest.v.z * rest.v.z);
-        let twist = (square * rest_square).sqrt() * torsion.ratio;
-        let bend = (one - square).max(zero) * (one - rest_square).max(zero);
-        let bend = bend.sqrt();
-        Self {
-            before: twists - bends,
-            behind: -(twists + bends),
-            diagonal: bend + twist,
-            off: bend - twist,
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn scale(self, k: R) -> Self {
-        let Self { before, behind, diagonal, off } = self;
-        Self { before: before * k, behind: behind * k, diagonal: diagonal * k, off: off * k }
-    }
+/// Second derivatives of a joint's energy, over K, with respect to the rotations of its edges about their tangents: on
+/// the diagonal and off it. At rest exact, elsewhere an upper bound, so that Newton steps do not overshoot: −K t·t′ in
+/// its place is too little for curls that are pulled straight, which bend less than they do at rest.
+#[inline(always)]
+pub(super) fn twist_stiffness<R: Real>(
+    before: Quaternion<R>,
+    q: Quaternion<R>,
+    rest: Quaternion<R>,
+    torsion: &Torsion<R>,
+) -> (R, R) {
+    let joint = Twist::new(before, q, rest);
+    let (one, zero) = (joint.w.lit(1.0), joint.w.lit(0.0));
+    let twist = (joint.square * joint.rest_square).sqrt() * torsion.ratio;
+    let bend = (one - joint.square).max(zero) * (one - joint.rest_square).max(zero);
+    let bend = bend.sqrt();
+    (bend + twist, bend - twist)
 }
 
 /// q e3.

@@ -6,7 +6,7 @@
 
 use super::{
     frames::{
-        Torsion, TwistDerivatives, choose, moment, parallel_transport, turned_by_e3, turned_since,
+        Torsion, choose, moment, parallel_transport, turned_by_e3, turned_since, twist_stiffness,
     },
     matrix::{Matrix, Pivot, Symmetric},
     row::DirectRow,
@@ -441,22 +441,17 @@ pub(crate) fn finish<W: Width>(
         let (t, k) = (q.tangent(), w.get(&edge.k));
         let rest = w.get4(&edge.rest);
         let torsion = stage.torsion.less(w.get(&edge.twist_loss));
-        let joint = if torsion.isotropic {
-            let elastic = moment(w, before.q, q, rest, k, &torsion);
-            TwistDerivatives {
-                before: -elastic.dot(before.t),
-                behind: elastic.dot(t),
-                diagonal: k,
-                off: -(k * t.dot(before.t)),
-            }
+        let elastic = moment(w, before.q, q, rest, k, &torsion);
+        let (k, coupling) = if torsion.isotropic {
+            (k, -(k * t.dot(before.t)))
         } else {
-            TwistDerivatives::new(before.q, q, rest, &torsion).scale(k)
+            let (diagonal, off) = twist_stiffness(before.q, q, rest, &torsion);
+            (k * diagonal, k * off)
         };
-        let k = joint.diagonal;
         let clamp = w.get(&edge.clamped) * w.lit(CLAMP);
-        let now = Twist { q, t, k, clamp, moment: joint.behind, coupling: joint.off };
+        let now = Twist { q, t, k, clamp, moment: elastic.dot(t), coupling };
         if i > 1 {
-            before.moment = before.moment + joint.before;
+            before.moment = before.moment - elastic.dot(before.t);
             before.eliminate(k, &mut turns, rows, i - 2, w);
         }
         before = now;
