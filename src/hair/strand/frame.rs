@@ -536,6 +536,7 @@ impl TickPose {
     }
 
     /// How a point that is fixed to it moves in this tick, in the frame and units of its hair, as far as motion acts on that.
+    #[cfg(feature = "groom")]
     pub(crate) fn motion_at(&self, place: Vec3) -> Vec3 {
         let PoseMotion { velocity, spin } = self.motion();
         let own = |v: Vec3| self.now.rotation.inverse() * v;

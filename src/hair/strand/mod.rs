@@ -35,8 +35,10 @@ pub use on_gpu::OnGpu;
 #[cfg(feature = "gpu")]
 pub(crate) use on_gpu::{AskForStrands, ReturnToCpu, StrandsArrived};
 pub(crate) use on_gpu::{MissedOnGpu, return_to_cpu};
+pub(crate) use owner::PlayedHair;
+#[cfg(any(feature = "groom", feature = "gpu"))]
+pub(crate) use owner::RecordedHair;
 pub use owner::{MotionOwner, Settling};
-pub(crate) use owner::{PlayedHair, RecordedHair};
 #[cfg(feature = "gpu")]
 pub(crate) use owner_systems::HairOnGpu;
 #[cfg(feature = "save")]
