@@ -7,8 +7,8 @@ use bevy::prelude::*;
 /// The motion of a groom: the nodes of all its strands at a number of times (m, in the frame of its hair). An asset, and
 /// immutable like [`Groom`]; a clone shares its arrays.
 ///
-/// It comes from a hair that was [recorded](RecordGroomCache), from an Alembic file of animated curves or from game code,
-/// goes to an Alembic file ([`alembic::write_cache`](super::alembic::write_cache)) and is [played](PlayGroomCache) on hair. A
+/// It comes from a hair that was [recorded](crate::authoring::groom::RecordGroomCache), from an Alembic file of animated curves or from game code,
+/// goes to an Alembic file ([`alembic::write_cache`](crate::authoring::groom::alembic::write_cache)) and is [played](crate::authoring::groom::PlayGroomCache) on hair. A
 /// node takes 12 bytes a frame.
 ///
 /// ```
