@@ -1,9 +1,10 @@
 //! Grooms that people really have: what the folders' README says is right for each.
 
+use crate::bytes;
 use bevy::{platform::collections::HashMap, prelude::*};
 use bevy_keratin::authoring::groom::*;
 use libtest_mimic::Trial;
-use std::{fs, path::Path};
+use std::path::Path;
 
 pub fn tests() -> Vec<Trial> {
     vec![
@@ -26,10 +27,6 @@ pub fn tests() -> Vec<Trial> {
         .with_ignored_flag(true),
         super::with("blender", "grooms::usd_is_named", usd_is_named),
     ]
-}
-
-fn bytes(folder: &Path, name: &str) -> Vec<u8> {
-    fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn read(folder: &Path, name: &str) -> (Groom, GroomLosses) {
@@ -205,11 +202,7 @@ fn alembic_in_life_size(folder: &Path) {
 
 /// Cut short and with bytes changed: a groom, or an error that says where; see the unit tests for memory.
 fn broken_alembic(folder: &Path, step: usize, changed: usize) {
-    let mut state = 1u64;
-    let mut random = |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        (state >> 33) as usize % below
-    };
+    let mut changes = crate::Changes::default();
     for name in ARCHIVES {
         let whole = bytes(folder, name);
         for end in (6..whole.len()).step_by(step) {
@@ -217,13 +210,7 @@ fn broken_alembic(folder: &Path, step: usize, changed: usize) {
             assert!(error.starts_with("byte ") && error.contains("expected"), "{error}");
         }
         for round in 0..changed {
-            let mut file = whole.clone();
-            // The structure is at the end and in headers; most other bytes are numbers.
-            let near = [file.len(), 3000, 600][round % 3];
-            for _ in 0..=random(8) {
-                let at = file.len() - 1 - random(near);
-                file[at] = random(256) as u8;
-            }
+            let file = changes.of(&whole, round);
             if let Ok((groom, _)) = alembic::read(&file) {
                 assert!(groom.points().len() <= file.len() / 4);
                 assert!(groom.points().iter().all(|p| p.is_finite()));

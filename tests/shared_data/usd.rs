@@ -1,10 +1,11 @@
 //! Files of Blender in USD, against what the folder's `expected.json` says of each.
 
+use crate::bytes;
 use bevy::prelude::*;
 use bevy_keratin::authoring::groom::*;
 use libtest_mimic::Trial;
 use serde_json::Value;
-use std::{fs, path::Path};
+use std::path::Path;
 
 /// As far as numbers of `expected.json` are rounded (m).
 const NEAR: f32 = 1e-5;
@@ -21,10 +22,6 @@ pub fn tests() -> Vec<Trial> {
         super::with("blender", "usd::broken_everywhere", |folder| broken(folder, 5_000))
             .with_ignored_flag(true),
     ]
-}
-
-fn bytes(folder: &Path, name: &str) -> Vec<u8> {
-    fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn load(folder: &Path, name: &str) -> (Groom, GroomLosses) {
@@ -111,11 +108,7 @@ fn without_hair(folder: &Path) {
 
 /// Cut short and with bytes changed: a groom or an error, never a panic.
 fn broken(folder: &Path, changed: usize) {
-    let mut state = 1u64;
-    let mut random = |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        (state >> 33) as usize % below
-    };
+    let mut changes = crate::Changes::default();
     for name in FILES {
         let whole = bytes(folder, name);
         for k in 0..changed / 4 {
@@ -123,13 +116,7 @@ fn broken(folder: &Path, changed: usize) {
             usd::read(&whole[..end]).expect_err("a file cut short");
         }
         for round in 0..changed {
-            let mut file = whole.clone();
-            // The structure of a .usdc is at its end.
-            let near = [file.len(), 3000, 600][round % 3];
-            for _ in 0..=random(8) {
-                let at = file.len() - 1 - random(near);
-                file[at] = random(256) as u8;
-            }
+            let file = changes.of(&whole, round);
             if let Ok((groom, _)) = usd::read(&file) {
                 assert!(groom.points().len() <= file.len() / 4);
                 assert!(groom.points().iter().all(|p| p.is_finite()));

@@ -137,7 +137,10 @@ impl GroomSettings {
     }
 
     pub(super) fn resample(&self, groom: Groom) -> Result<Groom, GroomError> {
-        self.nodes.map_or(Ok(groom.clone()), |nodes| groom.resampled(nodes))
+        match self.nodes {
+            Some(nodes) => groom.resampled(nodes),
+            None => Ok(groom),
+        }
     }
 
     /// Metres per unit and the axis that is up: of the settings, else of the file, else of its format.

@@ -99,6 +99,7 @@ fn a_recorded_run_plays_back_through_a_file() {
     }
     run(&mut app, 0.5);
     assert!(worst(&seen[59], &places(&app, &strands)) < 1e-5, "it stays at the last frame");
+    assert!(strands.iter().all(|id| rms_speed(strand(&app, *id)) == 0.0), "and rests there");
     assert_eq!(faults(&mut app), []);
 }
 
@@ -185,6 +186,16 @@ fn guides_of_a_groom_play_its_strands_by_their_roots() {
             let expected = own[0] + along * (0.19 * k as f32 / (own.len() - 1) as f32);
             assert!(p.distance(expected) < 1e-5, "{i}, {k}: {p}, {expected}");
         }
+    }
+    // What is cut while it plays stays cut.
+    app.world_mut().trigger(CutHair::all(id, CutBy::Length(0.1)));
+    app.world_mut().flush();
+    run(&mut app, 0.1);
+    let members: Vec<Entity> = app.world().get::<Strands>(id).unwrap().iter().collect();
+    for member in members {
+        let own = strand(&app, member);
+        let length: f32 = own.positions().windows(2).map(|p| p[0].distance(p[1])).sum();
+        assert!((length - 0.1).abs() < 1e-4 && own.peak_strain() < 1e-3, "{length}");
     }
 }
 

@@ -9,12 +9,13 @@ use crate::{
         schedule::{HairFrame, HairStep, HairSystems, HairTick, last_substep},
     },
     hair::strand::{
-        Hair, PlayedHair, Regroomed, Settling, SimulatedHere, Strand, StrandHistory, StrandRank,
-        Strands, TickPose,
+        CutStrand, Hair, PlayedHair, Regroomed, Settling, SimulatedHere, Strand, StrandHistory,
+        StrandRank, Strands, TickPose,
     },
 };
 use bevy::{
     asset::{AssetEvent, LoadState},
+    ecs::entity::EntityHashMap,
     platform::collections::HashSet,
     prelude::*,
 };
@@ -27,9 +28,10 @@ use core::ops::Range;
 /// are played. [`MotionOwner::Played`](crate::MotionOwner::Played) says that it is on.
 ///
 /// A hair of as many strands as the cache, with as many nodes each, plays node by node; of a recorded hair that is the order
-/// of its strands. Else each strand plays the one of the cache whose root was nearest in the first frame, its own nodes evenly
-/// along it: as guides of [`GroomedHair`](crate::authoring::groom::GroomedHair) grow on that groom. Lengths are not restored:
-/// what a file stretches stays stretched until the hair is simulated again.
+/// of its strands. Else each strand plays the one of the cache whose root was nearest in the first frame, its nodes as far along
+/// it as its lengths say: as guides of [`GroomedHair`](crate::authoring::groom::GroomedHair) grow on that groom. A strand that
+/// has been cut plays as much of it as is left. Lengths are not restored: what a file stretches stays stretched until the hair is
+/// simulated again.
 ///
 /// ```
 /// # use bevy_keratin::{prelude::*, authoring::groom::*}; use bevy::prelude::*;
@@ -65,15 +67,24 @@ impl PlayGroomCache {
         Self { cache, ..default() }
     }
 
-    /// The time so many seconds later, and whether that is a jump.
-    fn after(&self, seconds: f32, duration: f32) -> (f32, bool) {
+    /// The time so many seconds later, that from which hair has moved there, and whether it begins again in between.
+    fn after(&self, seconds: f32, duration: f32) -> Advance {
         let [time, speed] = [self.time, self.speed].map(|n| if n.is_finite() { n } else { 0.0 });
         let next = time + speed * seconds;
         if (0.0..=duration).contains(&next) || !self.repeat || duration <= 0.0 {
-            return (next.clamp(0.0, duration), false);
+            return Advance { from: time, to: next.clamp(0.0, duration), wraps: false };
         }
-        (next.rem_euclid(duration), true)
+        let to = next.rem_euclid(duration);
+        Advance { from: to - speed * seconds, to, wraps: true }
     }
+}
+
+/// A tick's way through a cache.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Advance {
+    from: f32,
+    to: f32,
+    wraps: bool,
 }
 
 /// What a hair plays.
@@ -85,8 +96,8 @@ struct Playback {
     strands: Vec<(Entity, u32)>,
     /// Where the tick before has left it (s).
     time: Option<f32>,
-    /// Whether it was reported that it cannot be played.
-    reported: bool,
+    /// What was reported not to be there.
+    failed: Option<AssetId<GroomCache>>,
 }
 
 pub(super) fn build(app: &mut App) {
@@ -138,21 +149,28 @@ fn begin(
             faults.write(HairFault::new(FaultKind::Setting, message).of(hair));
         }
         let Some(cache) = caches.get(id) else {
-            if let (LoadState::Failed(error), false) = (assets.load_state(id), playback.reported) {
+            let is_known = playback.failed == Some(id);
+            if let (LoadState::Failed(error), false) = (assets.load_state(id), is_known) {
                 let error = error.to_string();
                 let error = error.lines().next().unwrap_or_default().to_owned();
                 let message = format!("the hair's cache was not loaded: {error}; it is simulated");
                 faults.write(HairFault::new(FaultKind::Groom, message).of(hair));
-                playback.reported = true;
+                *playback = Playback { failed: Some(id), ..default() };
                 commands.entity(hair).try_remove::<PlayedHair>();
             }
             continue;
         };
         let are_others = members.as_ref().is_some_and(|members| members.is_changed());
-        let is_same = playback.cache == id && !playback.strands.is_empty();
-        if is_same && !are_others && !regroomed.is_changed() && !changed.contains(&id) {
+        let is_same = playback.cache == id && !changed.contains(&id);
+        let is_matched = is_same && !playback.strands.is_empty();
+        if is_matched && !are_others && !regroomed.is_changed() {
             continue;
         }
+        // Those that play go on with the same strand: their roots may have moved.
+        let known: EntityHashMap<u32> = match is_same {
+            true => playback.strands.drain(..).collect(),
+            false => default(),
+        };
         let members = members.iter().flat_map(|members| members.iter());
         let mut own: Vec<_> = members
             .filter_map(|entity| Some((entity, strands.get(entity).ok()?)))
@@ -161,8 +179,8 @@ fn begin(
         own.sort_by_key(|(entity, (_, rank))| (**rank, *entity));
         let own: Vec<(Entity, &Strand)> =
             own.into_iter().map(|(entity, (strand, _))| (entity, strand)).collect();
-        playback.strands = matched(cache, &own);
-        (playback.cache, playback.reported) = (id, false);
+        playback.strands = matched(cache, &own, &known);
+        (playback.cache, playback.failed) = (id, None);
         if !playback.strands.is_empty() {
             commands.entity(hair).try_insert(PlayedHair).try_remove::<Settling>();
         }
@@ -170,7 +188,11 @@ fn begin(
 }
 
 /// Which strand of a cache each of these plays.
-fn matched(cache: &GroomCache, own: &[(Entity, &Strand)]) -> Vec<(Entity, u32)> {
+fn matched(
+    cache: &GroomCache,
+    own: &[(Entity, &Strand)],
+    known: &EntityHashMap<u32>,
+) -> Vec<(Entity, u32)> {
     let strands = || cache.groom().strands();
     let is_same = own.len() == strands().len()
         && own.iter().zip(strands()).all(|((_, own), of)| own.nodes() == of.points.len());
@@ -181,6 +203,9 @@ fn matched(cache: &GroomCache, own: &[(Entity, &Strand)]) -> Vec<(Entity, u32)> 
         (0..strands().len()).filter_map(|i| Some(cache.frame(0)[nodes_of(cache, i)?.start]));
     let roots = KdTree::new(roots.zip(0..));
     let nearest = |(entity, strand): &(Entity, &Strand)| {
+        if let Some(of) = known.get(entity) {
+            return Some((*entity, *of));
+        }
         let root = strand.positions().first()?;
         let (of, _) = roots.nearest::<1>(*root).next()?;
         Some((*entity, of))
@@ -197,35 +222,31 @@ fn play(
     step: Res<HairStep>,
     caches: Res<Assets<GroomCache>>,
     mut hairs: Query<(&mut PlayGroomCache, &mut Playback, &TickPose), With<PlayedHair>>,
-    mut strands: Query<(&mut Strand, &mut StrandHistory), SimulatedHere>,
+    mut strands: Query<(&mut Strand, &mut StrandHistory, Option<&CutStrand>), SimulatedHere>,
     mut scratch: Local<[Vec<Vec3>; 2]>,
 ) {
     let seconds = step.dt * step.count as f32;
     for (mut wanted, mut playback, pose) in &mut hairs {
         let Some(cache) = caches.get(playback.cache) else { continue };
         let was_put = playback.time.is_none_or(|time| time != wanted.time);
-        let (time, wraps) = wanted.after(seconds, cache.duration());
-        // What it was just before, wherever it has come from.
-        let forth = if wanted.speed < 0.0 { -seconds } else { seconds };
-        let is_still = wanted.speed == 0.0 || !wanted.speed.is_finite();
+        let Advance { from, to, wraps } = wanted.after(seconds, cache.duration());
         let [now, before] = &mut *scratch;
-        cache.at(time, now);
-        cache.at(time - forth * wanted.speed.abs(), before);
-        let per_second = if is_still { 0.0 } else { seconds.recip() };
-        wanted.bypass_change_detection().time = time;
-        playback.time = Some(time);
+        cache.at(to, now);
+        cache.at(from, before);
+        wanted.bypass_change_detection().time = to;
+        playback.time = Some(to);
         for (entity, of) in &playback.strands {
-            let (Ok((mut strand, mut history)), Some(nodes)) =
+            let (Ok((mut strand, mut history, cut)), Some(nodes)) =
                 (strands.get_mut(*entity), nodes_of(cache, *of as usize))
             else {
                 continue;
             };
             let strand = strand.bypass_change_detection();
-            let even = Even::of(&now[nodes.clone()], strand.nodes());
+            let along = Along::of(&now[nodes.clone()], strand, cut);
             let [now, before] = [&now[nodes.clone()], &before[nodes]];
             strand.put_nodes(|node| {
-                let [now, before] = [now, before].map(|points| even.at(points, node));
-                (now, (now - before) * per_second + pose.motion_at(now))
+                let [now, before] = [now, before].map(|points| along.at(points, node));
+                (now, (now - before) / seconds + pose.motion_at(now))
             });
             if was_put || wraps {
                 history.bypass_change_detection().remember(strand);
@@ -234,19 +255,26 @@ fn play(
     }
 }
 
-/// A polyline as evenly spaced nodes, of another pose by the same shares of its segments.
-struct Even(Vec<(usize, f32)>);
+/// Where the nodes of a strand are along a polyline, as shares of its segments: so they are in any other pose of it.
+struct Along(Vec<(usize, f32)>);
 
-impl Even {
-    /// Node by node where there are as many.
-    fn of(points: &[Vec3], nodes: usize) -> Self {
-        if points.len() == nodes {
+impl Along {
+    /// Node by node where a whole strand has as many as the polyline, else as far along as the strand's own lengths say.
+    fn of(points: &[Vec3], strand: &Strand, cut: Option<&CutStrand>) -> Self {
+        let cut = cut.filter(|cut| cut.fits(strand.nodes()));
+        if points.len() == strand.nodes() && cut.is_none() {
             return Self(Vec::new());
         }
+        let own = strand.length();
+        let whole = cut.map_or(own, |cut| cut.whole_length().max(own));
         let mut along = Vec::new();
-        let length = arc_lengths(points, &mut along);
-        let share = |node: usize| node as f64 / (nodes - 1) as f64;
-        Self((0..nodes).map(|node| place(&along, length * share(node))).collect())
+        let scale = arc_lengths(points, &mut along) / f64::from(whole);
+        let mut at = 0.0;
+        let ends = strand.rest_lengths().iter().map(|length| {
+            at += f64::from(*length);
+            at
+        });
+        Self([0.0].into_iter().chain(ends).map(|at| place(&along, at * scale)).collect())
     }
 
     fn at(&self, points: &[Vec3], node: usize) -> Vec3 {
@@ -264,12 +292,18 @@ mod tests {
     #[test]
     fn time_ends_at_the_last_frame_or_begins_again() {
         let play = |time, speed, repeat| PlayGroomCache { time, speed, repeat, ..default() };
-        assert_eq!(play(0.5, 1.0, false).after(0.25, 2.0), (0.75, false));
-        assert_eq!(play(1.9, 1.0, false).after(0.25, 2.0), (2.0, false));
-        assert_eq!(play(1.75, 1.0, true).after(0.5, 2.0), (0.25, true));
-        assert_eq!(play(0.25, -1.0, true).after(0.5, 2.0), (1.75, true));
-        assert_eq!(play(0.25, -1.0, false).after(0.5, 2.0), (0.0, false));
-        assert_eq!(play(f32::NAN, f32::INFINITY, true).after(0.5, 2.0), (0.0, false));
-        assert_eq!(play(1.0, 1.0, true).after(0.5, 0.0), (0.0, false));
+        let after = |play: PlayGroomCache, seconds, duration| {
+            let Advance { from, to, wraps } = play.after(seconds, duration);
+            (from, to, wraps)
+        };
+        assert_eq!(after(play(0.5, 1.0, false), 0.25, 2.0), (0.5, 0.75, false));
+        assert_eq!(after(play(1.875, 1.0, false), 0.25, 2.0), (1.875, 2.0, false));
+        // At the end it stands still.
+        assert_eq!(after(play(2.0, 1.0, false), 0.25, 2.0), (2.0, 2.0, false));
+        assert_eq!(after(play(1.75, 1.0, true), 0.5, 2.0), (-0.25, 0.25, true));
+        assert_eq!(after(play(0.25, -1.0, true), 0.5, 2.0), (2.25, 1.75, true));
+        assert_eq!(after(play(0.25, -1.0, false), 0.5, 2.0), (0.25, 0.0, false));
+        assert_eq!(after(play(f32::NAN, f32::INFINITY, true), 0.5, 2.0), (0.0, 0.0, false));
+        assert_eq!(after(play(1.0, 1.0, true), 0.5, 0.0), (1.0, 0.0, false));
     }
 }
