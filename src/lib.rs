@@ -62,6 +62,7 @@ mod book {
         Debug: "debug.md",
         FirstHour: "first-hour.md",
         Grooms: "grooms.md",
+        Recipes: "recipes.md",
         Rollback: "rollback.md",
         Saving: "saving.md",
         Styling: "styling.md",

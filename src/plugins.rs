@@ -48,6 +48,7 @@ use bevy::{
 /// | `SavePlugin` | captures and applies hairdos | feature `save`, strands, `BondPlugin` |
 /// | `GroomPlugin` | loads grooms and grows them | feature `groom`, Bevy's `AssetPlugin` |
 /// | `PlantPlugin` | registers the settings of planting | feature `groom` |
+/// | `RecipePlugin` | loads recipes, and puts their settings on hair | feature `groom`, Bevy's `AssetPlugin` |
 /// | `ColliderFitPlugin` | registers the results of fitting colliders | feature `groom` |
 /// | `AttachPlugin` | roots follow meshes and bones | feature `groom`, strands |
 /// | `WearPlugin` | hair on characters with `WearHair` | feature `groom`, strands |
@@ -132,6 +133,7 @@ impl PluginGroup for HairPlugins {
         let group = group
             .add(crate::authoring::groom::GroomPlugin)
             .add(crate::authoring::plant::PlantPlugin)
+            .add(crate::authoring::recipe::RecipePlugin)
             .add(crate::authoring::collider_fit::ColliderFitPlugin)
             .add(crate::authoring::attach::AttachPlugin)
             .add(crate::authoring::wear::WearPlugin);

@@ -43,6 +43,7 @@ mod stage;
 #[path = "../shared/studio.rs"]
 mod studio;
 
+mod counts;
 mod export;
 mod loops;
 mod sheets;
@@ -110,6 +111,13 @@ pub struct Arguments {
     /// Drawn strands of a head of 40,000, of others in proportion. Fewer are drawn wider.
     #[arg(long, default_value = "40000", value_parser = clap::value_parser!(u32).range(100..))]
     strands: u32,
+    /// Draws no picture, but counts what each pass of a frame shades and computes: for one near head, and for a hundred.
+    /// `--size` and `--strands` make it less.
+    #[arg(long)]
+    counts: bool,
+    /// Counts as JSON.
+    #[arg(long, requires = "counts")]
+    json: bool,
     /// How many times larger, along and across, pictures are drawn and averaged.
     #[arg(long, default_value = "2", value_parser = clap::value_parser!(u32).range(1..=4))]
     supersample: u32,
@@ -147,6 +155,15 @@ impl Arguments {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     failure::explain_known();
+    if arguments.counts {
+        return match counts::print(arguments.json, arguments.size, arguments.strands) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("error: {error}");
+                ExitCode::FAILURE
+            }
+        };
+    }
     let all = Piece::value_variants().to_vec();
     let pieces = if arguments.pieces.is_empty() { all } else { arguments.pieces.clone() };
     for piece in pieces {

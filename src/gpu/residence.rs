@@ -115,8 +115,8 @@ pub enum Unsupported {
     GroomCache,
     /// Its [`HairStyle`](crate::HairStyle) is watched.
     WatchedStyle,
-    /// Strands that are stiffer or softer than others ([`StrandStiffness`](crate::StrandStiffness)).
-    StrandStiffness,
+    /// Strands that are stiffer, softer or damped otherwise than others ([`StrandMaterial`](crate::StrandMaterial)).
+    StrandMaterial,
     /// Its strands count the wind that they receive ([`WindReceived`](crate::WindReceived)).
     WindReceived,
     /// A treatment of single strands, or of more than eight ranges of joints.
@@ -171,7 +171,7 @@ impl fmt::Display for Unsupported {
             Self::Settling => "it is still settling",
             Self::GroomCache => "it is recorded, or plays a groom cache",
             Self::WatchedStyle => "its style is watched",
-            Self::StrandStiffness => "strands of their own stiffness are not supported there",
+            Self::StrandMaterial => "strands of their own stiffness or damping are not supported there",
             Self::WindReceived => "the wind that it receives is counted",
             Self::Treatments => "treatments of single strands are not supported there",
             Self::Strands => "it has no strands that can be simulated",

@@ -21,15 +21,12 @@ use crate::{
         style::HairStyle,
         tie::{TieProgress, Tied},
     },
-    keratin::{
-        bond::StrandStiffness,
-        treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
-    },
+    keratin::treatment::{PermRod, PermWinding, WindingProgress, WoundOn},
     simulation::{
         lod::{Guides, PresentLod},
         settle::Settling,
     },
-    solver::rod::{HairSolver, SolverMethod},
+    solver::rod::{HairSolver, SolverMethod, StrandMaterial},
     water::{Droplet, IsWet, Shower, WaterVolume},
 };
 use bevy::{
@@ -78,7 +75,7 @@ pub(super) struct Support<'w, 's> {
     tied: Query<'w, 's, (&'static StrandOf, &'static TieProgress), With<Tied>>,
     rods: Query<'w, 's, (), With<PermRod>>,
     counted: Query<'w, 's, &'static StrandOf, With<WindReceived>>,
-    stiff: Query<'w, 's, (&'static StrandOf, &'static StrandStiffness)>,
+    materials: Query<'w, 's, (&'static StrandOf, &'static StrandMaterial)>,
     cached: Query<'w, 's, (), Or<(With<PlayedHair>, With<RecordedHair>)>>,
     disabled: Query<'w, 's, &'static StrandOf, (With<OnGpu>, With<Disabled>)>,
     #[cfg(feature = "groom")]
@@ -104,8 +101,8 @@ impl Support<'_, '_> {
         let begins = self.tied.iter().filter(|(_, tie)| tie.waits());
         found.extend(begins.map(|(of, _)| (of.0, Unsupported::Winding)));
         found.extend(self.counted.iter().map(|of| (of.0, Unsupported::WindReceived)));
-        let stiff = self.stiff.iter().filter(|(_, own)| own.share != 1.0);
-        found.extend(stiff.map(|(of, _)| (of.0, Unsupported::StrandStiffness)));
+        let own = self.materials.iter().filter(|(_, own)| **own != StrandMaterial::default());
+        found.extend(own.map(|(of, _)| (of.0, Unsupported::StrandMaterial)));
         found.extend(self.disabled.iter().map(|of| (of.0, Unsupported::Strands)));
         found
     }

@@ -6,7 +6,7 @@ pub mod treatment;
 /// The room's share of [the prelude](crate::prelude).
 pub mod prelude {
     pub use crate::keratin::bond::{
-        BondChanges, BondInfluence, BondKind, Bonds, Cuticle, JointBonds, StrandStiffness,
+        BondChanges, BondInfluence, BondKind, Bonds, Cuticle, JointBonds,
     };
     pub use crate::keratin::treatment::{
         HairTreatment, PermRod, PermWinding, WoundOn, WoundStrands,

@@ -17,6 +17,7 @@ use bevy::{
     prelude::*,
     render::{
         Extract, ExtractSchedule, RenderApp, RenderStartup,
+        diagnostic::RecordDiagnostics,
         render_asset::RenderAssets,
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries,
@@ -172,9 +173,12 @@ pub(super) fn expand(
     ribbons.write_buffer(&device, &queue);
     let Some((uniform, ribbon)) = ribbons.buffer().zip(ribbons.binding()) else { return };
     let most = device.limits().max_compute_workgroups_per_dimension;
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
     let mut pass = context
         .command_encoder()
         .begin_compute_pass(&ComputePassDescriptor { label: Some("hair rings"), ..default() });
+    let span = diagnostics.pass_span(&mut pass, "hair, rings");
     pass.set_pipeline(pipeline);
     for hair in hairs.iter() {
         let gpu = hair.buffers.map(|id| buffers.get(id).map(|gpu| &gpu.buffer));
@@ -198,4 +202,5 @@ pub(super) fn expand(
             hair.rings.count().div_ceil(u64::from(WORKGROUP_SIZE)).min(u64::from(u32::MAX)) as u32;
         pass.dispatch_workgroups(count.min(most), count.div_ceil(most), 1);
     }
+    span.end(&mut pass);
 }

@@ -22,6 +22,7 @@ use bevy::{
         Extract, ExtractSchedule, Render, RenderApp, RenderDebugFlags, RenderSystems,
         batching::gpu_preprocessing::{GpuPreprocessingMode, GpuPreprocessingSupport},
         camera::ExtractedCamera,
+        diagnostic::RecordDiagnostics,
         erased_render_asset::ErasedRenderAssets,
         mesh::allocator::MeshAllocator,
         render_phase::{
@@ -322,6 +323,8 @@ fn draw(
         resolve_target: marks.sampled.is_some().then_some(&*marks.texture.default_view),
         ops: Operations { load: LoadOp::Clear(none), store: StoreOp::Store },
     };
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
     let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
         label: Some("hair"),
         color_attachments: &[Some(target.get_color_attachment()), Some(marks)],
@@ -330,6 +333,7 @@ fn draw(
         occlusion_query_set: None,
         multiview_mask: None,
     });
+    let span = diagnostics.pass_span(&mut pass, "hair");
     let viewport = Viewport::from_viewport_and_override(camera.viewport.as_ref(), resolution);
     if let Some(viewport) = viewport {
         pass.set_camera_viewport(&viewport);
@@ -339,4 +343,5 @@ fn draw(
             tracing::error!("hair is not drawn: {error:?}");
         }
     }
+    span.end(&mut pass);
 }

@@ -16,6 +16,7 @@ use bevy::{
     prelude::*,
     render::{
         Render, RenderApp, RenderStartup, RenderSystems,
+        diagnostic::RecordDiagnostics,
         extract_component::{
             ComponentUniforms, DynamicUniformIndex, ExtractComponent, ExtractComponentPlugin,
             UniformComponentPlugin,
@@ -208,6 +209,8 @@ fn smooth(
         &cache.get_bind_group_layout(&smoother.layout),
         &BindGroupEntries::sequential((write.source, marks.view(), asked)),
     );
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
     let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
         label: Some("smoothing of hair"),
         // The one that was written to until now has been exchanged for the other.
@@ -217,7 +220,9 @@ fn smooth(
         occlusion_query_set: None,
         multiview_mask: None,
     });
+    let span = diagnostics.pass_span(&mut pass, "hair, smoothing");
     pass.set_render_pipeline(pipeline);
     pass.set_bind_group(0, &group, &[uniform.index()]);
     pass.draw(0..3, 0..1);
+    span.end(&mut pass);
 }

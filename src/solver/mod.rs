@@ -9,6 +9,6 @@ pub mod rod;
 pub mod prelude {
     pub use crate::solver::mass_spring::Springs;
     pub use crate::solver::rod::{
-        HairSolver, HairStiffness, SolverMethod, StretchProjection, Sweeps,
+        HairSolver, HairStiffness, SolverMethod, StrandMaterial, StretchProjection, Sweeps,
     };
 }

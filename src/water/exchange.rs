@@ -49,6 +49,8 @@ pub(crate) struct FoundWater {
     waited: f32,
     /// For how many more substeps hair may emerge from a volume of water that is gone.
     pub(super) emerging: u32,
+    /// Whether hair was put back as it was, and its water with it.
+    pub(crate) is_restored: bool,
 }
 
 impl FoundWater {

@@ -128,6 +128,9 @@ fn count_lost_moisture(
     }
 }
 
+/// What sums in another order may differ by, as a share.
+const ROUNDING: f64 = 1e-12;
+
 /// Once a tick: counts the water of components that were assigned another value from outside. Only where
 /// there was an assignment, so that the ledger still detects errors of the tick itself.
 fn count_overwritten(
@@ -136,17 +139,27 @@ fn count_overwritten(
     strands: Query<&Moisture, Allow<Disabled>>,
     // What is written to hair on the GPU is found once it is back.
     watched: Query<Ref<Moisture>, (Allow<Disabled>, Here)>,
-    mut ledger: ResMut<WaterLedger>,
+    (mut ledger, mut found): (ResMut<WaterLedger>, ResMut<FoundWater>),
 ) {
     let written = || {
         droplets.iter().any(|d| d.is_changed() && !d.is_added())
             || watched.iter().any(|m| m.is_changed() && !m.is_added())
     };
-    if step.index == 0 && ledger.water_in > 0.0 && written() {
+    if step.index > 0 {
+        return;
+    }
+    let is_written = ledger.water_in > 0.0 && written();
+    let is_restored = core::mem::take(&mut found.is_restored);
+    if is_written || is_restored {
         let counted = droplets.iter().map(|d| d.counted.0).sum::<f64>()
             + strands.iter().map(|m| m.counted()).sum::<f64>();
         let lost = ledger.water_in - ledger.water_out - counted;
-        ledger.record(-lost);
+        // Put back with its balance nothing is missing, and no bit changes.
+        if is_written || lost.abs() > ROUNDING * ledger.water_in.max(counted) {
+            ledger.record(-lost);
+            found.any |= is_restored;
+            found.busy |= is_restored;
+        }
     }
 }
 

@@ -64,3 +64,64 @@ pub fn followers_are_drawn_where_they_are_given_and_no_more_than_asked_for() {
     assert!(guide > 5 && first + second == 0, "around the guide again: {guide} {first} {second}");
     assert_eq!(scene.app.world().get::<HairBuffers>(hair).unwrap().strand_count, 10);
 }
+
+/// A picture of hair that falls over, and one of the same hair as a file of that run has it.
+pub fn hair_that_is_played_is_drawn_as_it_was_when_it_was_recorded() {
+    let spawn = |scene: &mut Offscreen, is_kept: bool| {
+        scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
+        let light = DirectionalLight { illuminance: 6000.0, ..default() };
+        let world = scene.app.world_mut();
+        world.spawn((light, Transform::from_xyz(1.0, 1.5, 1.0).looking_at(Vec3::ZERO, Vec3::Y)));
+        let followers = HairFollowers::new(300);
+        let hair = world.spawn((Hair, HairLook::default(), followers)).id();
+        if is_kept {
+            world.entity_mut(hair).insert(RecordGroomCache::default());
+        }
+        for i in 0..9 {
+            let root = Vec3::new(0.03 * (i % 3) as f32 - 0.03, 0.0, 0.02 * (i / 3) as f32);
+            let lean = Vec3::new(0.3, 1.0, 0.1 * i as f32).normalize();
+            let line: Vec<Vec3> = (0..12).map(|k| root + lean * (0.012 * k as f32)).collect();
+            world.spawn((StrandOf(hair), Strand::from_polyline(&line).unwrap()));
+        }
+        hair
+    };
+    let tick = |scene: &mut Offscreen, ticks: u32| {
+        scene.ticking(1);
+        (0..ticks).for_each(|_| scene.app.update());
+        scene.ticking(0);
+    };
+    let mut scene = Offscreen::new(240, 180);
+    let hair = spawn(&mut scene, true);
+    let first = scene.draw();
+    tick(&mut scene, 20);
+    let fallen = scene.draw();
+    let cache = GroomCache::of_recording(scene.app.world_mut(), hair).unwrap();
+    let (cache, losses) = GroomCache::from_file(
+        &bevy_keratin::authoring::groom::alembic::write_cache(&cache).unwrap(),
+        &GroomSettings { keep_strays: true, ..default() },
+    )
+    .unwrap();
+    assert!(losses.is_empty(), "{losses}");
+    let end = cache.duration();
+
+    let mut scene = Offscreen::new(240, 180);
+    let hair = spawn(&mut scene, false);
+    let cache = scene.app.world_mut().resource_mut::<Assets<GroomCache>>().add(cache);
+    let play = PlayGroomCache { time: end, speed: 0.0, ..PlayGroomCache::new(cache) };
+    scene.app.world_mut().entity_mut(hair).insert(play);
+    tick(&mut scene, 3);
+    let played = scene.draw();
+    let other = |a: &Picture, b: &Picture| {
+        let pairs = a.pixels().zip(b.pixels());
+        pairs.filter(|(a, b)| a.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 8)).count()
+    };
+    let hairy = fallen.covered(BLACK);
+    let (moved, off) = (other(&first, &fallen), other(&played, &fallen));
+    println!("{hairy} pixels of hair, {moved} changed as it fell, {off} as it was played");
+    if let Ok(folder) = std::env::var("PLAYED") {
+        fallen.save(&format!("{folder}/recorded.png"));
+        played.save(&format!("{folder}/played.png"));
+    }
+    assert!(hairy > 1000 && moved > hairy / 2, "{hairy} {moved}");
+    assert!(off < hairy / 50, "{off} of {hairy}");
+}

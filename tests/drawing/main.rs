@@ -107,7 +107,8 @@ device::tests! {
             what_lights_hair_compiles_for_cameras_in_air;
     }
     groom {
-        device: followers_are_drawn_where_they_are_given_and_no_more_than_asked_for;
+        device: followers_are_drawn_where_they_are_given_and_no_more_than_asked_for,
+            hair_that_is_played_is_drawn_as_it_was_when_it_was_recorded;
     }
     light {
         device: what_comes_through_strands_falls_with_their_number,

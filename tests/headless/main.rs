@@ -80,6 +80,7 @@ mod morph;
 mod pairs;
 mod papers_scenes;
 mod plant;
+mod recipe;
 mod reflection;
 mod report;
 mod rest;

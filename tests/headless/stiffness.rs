@@ -18,7 +18,9 @@ fn level(app: &mut App) -> (Entity, Vec<Entity>) {
         let strand = Strand::from_polyline(&(0..17).map(node).collect::<Vec<_>>()).unwrap();
         let strand = app.world_mut().spawn((StrandOf(hair), strand)).id();
         if let Some(share) = share {
-            app.world_mut().entity_mut(strand).insert(StrandStiffness { share });
+            app.world_mut()
+                .entity_mut(strand)
+                .insert(StrandMaterial { stiffness: share, ..default() });
         }
         strand
     };
@@ -54,8 +56,8 @@ fn the_sag_of_a_level_strand_is_that_of_its_own_stiffness() {
     run(&mut app, 3.0);
     let asleep = |app: &App, id| app.world().get::<StrandSleep>(id).unwrap().is_asleep();
     assert!(strands.iter().all(|id| asleep(&app, *id)));
-    app.world_mut().get_mut::<StrandStiffness>(strands[3]).unwrap().share = 0.5;
-    app.world_mut().entity_mut(strands[4]).remove::<StrandStiffness>();
+    app.world_mut().get_mut::<StrandMaterial>(strands[3]).unwrap().stiffness = 0.5;
+    app.world_mut().entity_mut(strands[4]).remove::<StrandMaterial>();
     run(&mut app, 0.1);
     assert!(!asleep(&app, strands[3]) && !asleep(&app, strands[4]) && asleep(&app, strands[1]));
     run(&mut app, 4.0);
@@ -69,12 +71,12 @@ fn shares_out_of_range_are_reported_once_and_the_nearest_acts() {
     let mut app = test_app(60.0);
     let (_, strands) = level(&mut app);
     run(&mut app, 0.1);
-    app.world_mut().entity_mut(strands[0]).insert(StrandStiffness { share: -3.0 });
-    app.world_mut().entity_mut(strands[1]).insert(StrandStiffness { share: 1e9 });
+    app.world_mut().entity_mut(strands[0]).insert(StrandMaterial { stiffness: -3.0, ..default() });
+    app.world_mut().entity_mut(strands[1]).insert(StrandMaterial { stiffness: 1e9, ..default() });
     run(&mut app, 2.0);
     let reported = faults(&mut app);
     assert_eq!(reported.len(), 2, "{reported:?}");
-    let says = "StrandStiffness::share is -3, expected 0.01 to 100";
+    let says = "StrandMaterial::stiffness is -3, expected 0.01 to 100";
     assert!(reported.iter().any(|fault| fault.message.contains(says)), "{reported:?}");
     let worst = strands.iter().map(|id| strand(&app, *id).peak_strain()).fold(0.0, f32::max);
     assert!(worst < 0.01, "{worst}");
@@ -89,7 +91,9 @@ fn strands_of_any_share_keep_their_lengths_on_a_shaken_head() {
         let (hair, strands) = level(&mut app);
         app.world_mut().entity_mut(hair).insert(HairSolver { method, ..default() });
         for (id, share) in strands.iter().zip([0.01, 0.1, 1.0, 10.0, 100.0]) {
-            app.world_mut().entity_mut(*id).insert(StrandStiffness { share });
+            app.world_mut()
+                .entity_mut(*id)
+                .insert(StrandMaterial { stiffness: share, ..default() });
         }
         let mut worst = 0.0_f32;
         for tick in 0..120 {
@@ -116,13 +120,13 @@ fn the_gpu_leaves_such_hair_to_the_processor() {
     run(&mut app, 0.1);
     let why = |app: &App| *app.world().get::<HairResidence>(hair).unwrap();
     // Without a device that comes first.
-    let is = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::StrandStiffness));
+    let is = HairResidence::Cpu(WhyCpu::Unsupported(Unsupported::StrandMaterial));
     assert!(
         why(&app) == is || why(&app) == HairResidence::Cpu(WhyCpu::NoRenderer),
         "{:?}",
         why(&app)
     );
-    assert!(Unsupported::StrandStiffness.to_string().contains("own stiffness"));
+    assert!(Unsupported::StrandMaterial.to_string().contains("own stiffness"));
     assert!(strands.iter().all(|id| strand(&app, *id).is_finite()));
 }
 
@@ -149,11 +153,20 @@ fn strands_have_the_stiffness_of_their_groom() {
     assert_eq!(strands.len(), 8);
     for id in strands {
         let place = strand(&app, id).positions()[0].x;
-        let own = app.world().get::<StrandStiffness>(id).unwrap().share;
+        let own = app.world().get::<StrandMaterial>(id).unwrap().stiffness;
         assert_eq!(own, shares[(place / 0.01).round() as usize]);
     }
     let odd = |strand: &GroomStrand| strand.group.is_some_and(|group| group.name == "odd");
     assert_eq!(groom.strands().filter(odd).count(), 10);
+    let damped = groom.clone().with_damping(shares.clone()).unwrap();
+    let damped = damped.spawn(&mut app.world_mut().commands(), hair, &guides).unwrap();
+    app.world_mut().flush();
+    for id in damped {
+        let own = app.world().get::<StrandMaterial>(id).unwrap();
+        assert_eq!(own.damping, own.stiffness, "of the same strand");
+    }
+    let error = groom.clone().with_damping(vec![-1.0; 20]).unwrap_err().to_string();
+    assert!(error.contains("damping 0 of strand 0 is -1, expected a share of 0 to 100"), "{error}");
     let error = groom.clone().with_stiffness(vec![0.0; 20]).unwrap_err().to_string();
     assert!(error.contains("stiffness 0 of strand 0 is 0, expected a share of 0.01"), "{error}");
     assert!(groom.with_stiffness(vec![1.0; 3]).is_err());
@@ -186,4 +199,43 @@ fn drawn_strands_are_as_wide_beside_each_other_as_in_their_groom() {
         assert!((found / expected - 1.0).abs() < 1e-5, "{found} for {expected}");
     }
     assert_eq!(found.len(), 3);
+}
+
+/// One strand of a hair swings as one of another hair that is damped as much.
+#[test]
+fn a_strand_is_damped_by_its_own_share() {
+    let mut app = test_app(60.0);
+    app.insert_resource(HairDefault(SleepSettings::never()));
+    let grow = |app: &mut App, damping: f32, shares: &[Option<f32>]| -> Vec<Entity> {
+        let stiffness = HairStiffness { damping, ..default() };
+        let hair = app.world_mut().spawn((Hair, stiffness)).id();
+        let mut grown = Vec::new();
+        for (i, share) in shares.iter().enumerate() {
+            let node = |k: usize| Vec3::new(0.01 * k as f32, 0.0, 0.05 * i as f32);
+            let strand = Strand::from_polyline(&(0..16).map(node).collect::<Vec<_>>()).unwrap();
+            let strand = app.world_mut().spawn((StrandOf(hair), strand)).id();
+            if let Some(damping) = *share {
+                app.world_mut().entity_mut(strand).insert(StrandMaterial { damping, ..default() });
+            }
+            grown.push(strand);
+        }
+        grown
+    };
+    let own = grow(&mut app, 0.01, &[None, Some(1.0), Some(4.0), Some(0.0)]);
+    let (usual, more) = (grow(&mut app, 0.01, &[None])[0], grow(&mut app, 0.04, &[None])[0]);
+    let none = grow(&mut app, 0.0, &[None])[0];
+    let tip = |app: &App, id: Entity| strand(app, id).positions()[15].xy();
+    let (mut farthest, mut apart) = ([0.0_f32; 4], 0.0_f32);
+    for _ in 0..120 {
+        app.update();
+        let others = [usual, usual, more, none];
+        for ((own, other), farthest) in own.iter().zip(others).zip(&mut farthest) {
+            *farthest = farthest.max(tip(&app, *own).distance(tip(&app, other)));
+        }
+        apart = apart.max(tip(&app, usual).distance(tip(&app, more)));
+    }
+    println!("{farthest:?} of {apart}");
+    assert!(apart > 0.01, "damping shows: {apart}");
+    assert!(farthest.iter().all(|far| *far < 1e-5), "{farthest:?}");
+    assert_eq!(faults(&mut app), []);
 }

@@ -373,9 +373,10 @@ fn no_file_is_too_long_to_be_understood() {
 /// too, and what is done to hair in a pause stayed, 49,820 before reports of single hairs, grooms of drawn hair, strands of
 /// their own stiffness, groups by name, hair that keeps its hairdo on a changed groom, a pass of hair's own, and layers of drops, 51,210
 /// before contact by pairs of edges with friction and firm cores, 52,790 before USD, whose layers are checked before
-/// its library believes them, and grooms that move, which are recorded, read, written and played.
+/// its library believes them, and grooms that move, which are recorded, read, written and played, 55,130 before recipes,
+/// which hair follows as their files change, and damping and curl of single strands.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 55_130;
+const MOST_LINES: usize = 55_920;
 
 #[test]
 fn the_crate_stays_small() {

@@ -43,8 +43,8 @@ from mathutils.geometry import barycentric_transform
 
 # A strand as thick is no hair (m).
 THICK = 1e-3
-# What a strand's stiffness may be, as a share of the hair's.
-STIFFNESS = (0.01, 100.0)
+# What a strand's stiffness and damping may be, as shares of the hair's.
+SHARES = {"groom_stiffness": (0.01, 100.0), "groom_damping": (0.0, 100.0)}
 # Sizes that hair of a character has (m).
 SIZES = (5e-3, 4.0)
 # What particle systems have before anyone sets it: a centimetre at the root.
@@ -90,7 +90,7 @@ class Hair:
     color_scope: str = "con"  # … as this says: con, uni or vtx
     guides: np.ndarray | None = None  # one a strand
     groups: np.ndarray | None = None  # one a strand
-    stiffness: np.ndarray | None = None  # one a strand, a share of the hair's
+    shares: dict = field(default_factory=dict)  # by attribute, one a strand: shares of the hair's
 
     @property
     def roots(self):
@@ -108,7 +108,7 @@ class Hair:
             colors = colors[nodes if self.color_scope == "vtx" else strands]
         return Hair(self.name, self.points[nodes], self.counts[strands], self.head, part(self.widths, nodes),
                     part(self.uvs, strands), colors, self.color_scope, part(self.guides, strands),
-                    part(self.groups, strands), part(self.stiffness, strands))
+                    part(self.groups, strands), {k: v[strands] for k, v in self.shares.items()})
 
 
 @dataclass
@@ -359,8 +359,10 @@ def curves_hair(obj, depsgraph, options, scene, notes):
         hair.guides = marked[:, 0] != 0
     groups, _ = values_of(data, "groom_group_id", 1, ("CURVE",))
     hair.groups = None if groups is None else groups[:, 0].astype(np.int32)
-    shares, _ = values_of(data, "groom_stiffness", 1, ("CURVE",))
-    hair.stiffness = None if shares is None else shares[:, 0]
+    for name in SHARES:
+        shares, _ = values_of(data, name, 1, ("CURVE",))
+        if shares is not None:
+            hair.shares[name] = shares[:, 0]
     return [hair]
 
 
@@ -511,12 +513,13 @@ def cleaned(hair, notes):
     np.maximum.at(size, owner, apart)
     left_out(size < 1e-9, "without length")
     hair = hair.kept(strands)
-    if hair.stiffness is not None:
-        within = np.clip(np.nan_to_num(hair.stiffness, nan=1.0), *STIFFNESS)
-        if (within != hair.stiffness).any():
-            notes.append(f"{hair.name}: {int((within != hair.stiffness).sum())} values of groom_stiffness are outside "
-                         f"{STIFFNESS[0]} to {STIFFNESS[1]}: the nearest is written")
-        hair.stiffness = within
+    for name, shares in hair.shares.items():
+        low, high = SHARES[name]
+        within = np.clip(np.nan_to_num(shares, nan=1.0), low, high)
+        if (within != shares).any():
+            notes.append(f"{hair.name}: {int((within != shares).sum())} values of {name} are outside "
+                         f"{low} to {high}: the nearest is written")
+        hair.shares[name] = within
     if hair.widths is not None:
         negative = hair.widths < 0
         if negative.any():
@@ -704,8 +707,8 @@ def curve_set(archive, name, hair, group):
         attributes.append(archive.attribute("groom_color", hair.color_scope, "f32", hair.colors, 3))
     if hair.guides is not None:
         attributes.append(archive.attribute("groom_guide", "uni", "i16", hair.guides))
-    if hair.stiffness is not None:
-        attributes.append(archive.attribute("groom_stiffness", "uni", "f32", hair.stiffness))
+    for attribute, shares in hair.shares.items():
+        attributes.append(archive.attribute(attribute, "uni", "f32", shares))
     parts.append(archive.compound(".arbGeomParams", "", attributes))
     return archive.object(name, titled(CURVES, "Curve_v2:.geom"), [archive.compound(".geom", CURVES, parts)])
 

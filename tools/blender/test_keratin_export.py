@@ -602,18 +602,24 @@ class HairCurves(Test):
         self.assertEqual(marked["groom_guide"].tolist(), [int(i % 4 == 0) for i in range(100)])
         self.assertEqual(marked["groom_group_id"].tolist(), [i % 3 for i in range(100)])
 
-    def test_stiffness_of_strands(self):
+    def test_stiffness_and_damping_of_strands(self):
         hair = hair_curves("Hair", strands_of(100), head())
-        self.assertNotIn("groom_stiffness", self.export("plain", hair)["/groom/Head/Hair/Hair"])
+        plain = self.export("plain", hair)["/groom/Head/Hair/Hair"]
+        self.assertNotIn("groom_stiffness", plain)
+        self.assertNotIn("groom_damping", plain)
         shares = np.linspace(0.5, 2.0, 100).astype(np.float32)
         add(hair.data, "groom_stiffness", "FLOAT", "CURVE", "value", shares)
         written = self.export("stiff", hair)["/groom/Head/Hair/Hair"]
         self.near(written["groom_stiffness"], shares, 1e-6)
         self.assertEqual(written["scopes"]["groom_stiffness"], "uni")
+        add(hair.data, "groom_damping", "FLOAT", "CURVE", "value", 2.0 - shares)
+        written = self.export("damped", hair)["/groom/Head/Hair/Hair"]
+        self.near(written["groom_damping"], 2.0 - shares, 1e-6)
+        self.near(written["groom_stiffness"], shares, 1e-6)
         shares[:3] = -1.0, np.nan, 1e9
         add(hair.data, "groom_stiffness", "FLOAT", "CURVE", "value", shares)
         found, notes = self.notes(hair)
-        self.near(found.sets[0].stiffness[:4], [0.01, 1.0, 100.0, shares[3]], 1e-6)
+        self.near(found.sets[0].shares["groom_stiffness"][:4], [0.01, 1.0, 100.0, shares[3]], 1e-6)
         self.assertIn("3 values of groom_stiffness", notes)
 
     def test_several_heads_and_names_that_no_path_can_hold(self):

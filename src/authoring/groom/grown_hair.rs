@@ -13,7 +13,7 @@ use crate::{
         setting::{Ranged, ValueRange, setting},
     },
     hair::strand::{Hair, Strand, StrandOf, Strands},
-    keratin::bond::StrandStiffness,
+    solver::rod::StrandMaterial,
 };
 use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 
@@ -33,7 +33,8 @@ use bevy::{asset::LoadState, platform::collections::HashSet, prelude::*};
 /// [`FollowerRoots`](crate::render::FollowerRoots), and a hair without
 /// [`HairLook`](crate::render::HairLook) takes the groom's mean colour and width, if it has them.
 /// A strand that is drawn between guides is as wide beside the others as its mean width is; widths and colours of single
-/// nodes stay in the asset. Guides of a groom with [stiffness](Groom::with_stiffness) have theirs.
+/// nodes stay in the asset. Guides of a groom with [stiffness](Groom::with_stiffness)
+/// or [damping](Groom::with_damping) have theirs.
 ///
 /// ```
 /// # use bevy_keratin::{prelude::*, authoring::groom::*}; use bevy::prelude::*;
@@ -138,7 +139,7 @@ impl Groom {
         let strands = grown_strands.strands.into_iter();
         let strands: Vec<Entity> =
             strands.map(|strand| commands.spawn((StrandOf(hair), strand)).id()).collect();
-        let own = grown_strands.stiffness.into_iter().map(|share| StrandStiffness { share });
+        let own = grown_strands.materials;
         commands.insert_batch(strands.iter().copied().zip(own).collect::<Vec<_>>());
         Ok(strands)
     }
@@ -160,12 +161,12 @@ impl Groom {
         let coarse = self.picked(chosen.iter().copied());
         let coarse = coarse.resampled_by(|length| guides.nodes_of(length))?;
         let mut bones = RootBones { names: coarse.bones.names.clone(), ..default() };
-        let (mut strands, mut stiffness) = (Vec::with_capacity(coarse.len()), Vec::new());
+        let (mut strands, mut materials) = (Vec::with_capacity(coarse.len()), Vec::new());
         for (i, line) in coarse.strands().enumerate() {
             if let Ok(strand) = Strand::from_polyline(line.points) {
                 strands.push(strand);
                 bones.strands.extend(coarse.bones.strands.get(i));
-                stiffness.extend(line.stiffness);
+                materials.extend(line.material());
             }
         }
         if strands.is_empty() {
@@ -177,7 +178,7 @@ impl Groom {
             bones: is_bound.then(|| RootsOnBones { roots: roots(), bones, ..default() }),
             short: chosen.len() - strands.len(),
             strands,
-            stiffness,
+            materials,
             #[cfg(feature = "render")]
             followers: self.followers_of(&chosen),
         })
@@ -206,8 +207,8 @@ impl Groom {
 pub(crate) struct GrownStrands {
     /// The guides.
     pub strands: Vec<Strand>,
-    /// How stiff each is beside the others; empty where all are alike.
-    pub stiffness: Vec<f32>,
+    /// What each is beside the others; empty where all are alike.
+    pub materials: Vec<StrandMaterial>,
     /// What their roots follow, if the groom says so.
     pub bones: Option<RootsOnBones>,
     /// All other strands.

@@ -58,17 +58,19 @@ impl Intake {
 
     /// Leaves out an optional array that breaks more than half of the strands, if there is one.
     fn leave_out_array(&mut self) -> bool {
-        let arrays: [(&str, fn(&mut Groom)); 4] = [
+        let arrays: [(&str, fn(&mut Groom)); 5] = [
             (Groom::WIDTH, |groom| groom.widths.clear()),
             (Groom::COLOUR, |groom| groom.colors.clear()),
             (Groom::UV, |groom| groom.uvs.clear()),
             (Groom::STIFFNESS, |groom| groom.stiffness.clear()),
+            (Groom::DAMPING, |groom| groom.damping.clear()),
         ];
-        let Groom { widths, colors, uvs, stiffness, .. } = &self.groom;
-        if widths.is_empty() && colors.is_empty() && uvs.is_empty() && stiffness.is_empty() {
+        let Groom { widths, colors, uvs, stiffness, damping, .. } = &self.groom;
+        let optional = [widths.len(), colors.len(), uvs.len(), stiffness.len(), damping.len()];
+        if optional == [0; 5] {
             return false;
         }
-        let mut broken: [(usize, Option<GroomError>); 4] = default();
+        let mut broken: [(usize, Option<GroomError>); 5] = default();
         for (i, strand) in self.groom.strands().enumerate() {
             let Err(fault @ GroomError::OutOfRange { what, .. }) = strand.check(i) else {
                 continue;

@@ -48,7 +48,7 @@ pub use settings::GroomSettings;
 pub use size::OddSize;
 pub use up_axis::UpAxis;
 
-use crate::{base::setting::InvalidValue, keratin::bond::StrandStiffness};
+use crate::{base::setting::InvalidValue, solver::rod::StrandMaterial};
 use bevy::prelude::*;
 use shared::Shared;
 
@@ -65,6 +65,7 @@ pub struct Groom {
     uvs: Shared<Vec2>,
     guides: Shared<bool>,
     stiffness: Shared<f32>,
+    damping: Shared<f32>,
     /// Indices into `all_groups`, or beyond them.
     groups: Shared<u32>,
     all_groups: Shared<GroomGroup>,
@@ -109,6 +110,8 @@ pub struct GroomStrand<'a> {
     pub is_guide: bool,
     /// How stiff it is, if given: see [`Groom::with_stiffness`].
     pub stiffness: Option<f32>,
+    /// How damped it is, if given: see [`Groom::with_damping`].
+    pub damping: Option<f32>,
     /// The group that it is in, if there are any.
     pub group: Option<&'a GroomGroup>,
 }
@@ -217,6 +220,7 @@ impl Groom {
     const COLOUR: &str = "colour";
     const UV: &str = "UV";
     const STIFFNESS: &str = "stiffness";
+    const DAMPING: &str = "damping";
 
     /// A groom of these polylines (m), root first.
     ///
@@ -290,7 +294,7 @@ impl Groom {
     }
 
     /// The groom with a stiffness for each strand, as a share of that of its hair: strands that are simulated get
-    /// [`StrandStiffness`], all others follow them. Alembic and USD have it as the attribute `groom_stiffness`.
+    /// [`StrandMaterial`], all others follow them. Alembic and USD have it as the attribute `groom_stiffness`.
     ///
     /// ```
     /// # use bevy_keratin::{prelude::*, authoring::groom::*};
@@ -306,9 +310,19 @@ impl Groom {
     /// ```
     ///
     /// # Errors
-    /// When there are not as many as strands, or one is outside [`StrandStiffness::SHARE`].
+    /// When there are not as many as strands, or one is outside [`StrandMaterial::STIFFNESS`].
     pub fn with_stiffness(mut self, shares: Vec<f32>) -> Result<Self, GroomError> {
         self.stiffness = shares.into();
+        self.checked()
+    }
+
+    /// The groom with a damping for each strand, as a share of that of its hair, which strands that are simulated get as
+    /// [`StrandMaterial::damping`]. Alembic and USD have it as the attribute `groom_damping`.
+    ///
+    /// # Errors
+    /// When there are not as many as strands, or one is outside [`StrandMaterial::DAMPING`].
+    pub fn with_damping(mut self, shares: Vec<f32>) -> Result<Self, GroomError> {
+        self.damping = shares.into();
         self.checked()
     }
 
@@ -362,6 +376,7 @@ impl Groom {
         fits("uvs", self.uvs.len(), self.len())?;
         fits("guides", self.guides.len(), self.len())?;
         fits("stiffness", self.stiffness.len(), self.len())?;
+        fits("damping", self.damping.len(), self.len())?;
         fits("groups", self.groups.len(), self.len())?;
         fits("bones", self.bones.strands.len(), self.len())?;
         self.check_bones()?;
@@ -430,12 +445,20 @@ impl Groom {
             uv: self.uvs.get(i).copied(),
             is_guide: self.guides.get(i) == Some(&true),
             stiffness: self.stiffness.get(i).copied(),
+            damping: self.damping.get(i).copied(),
             group: self.groups.get(i).and_then(|group| self.all_groups.get(*group as usize)),
         }
     }
 }
 
 impl GroomStrand<'_> {
+    /// What it is beside others when it is simulated; `None` where the groom says nothing of it.
+    pub(crate) fn material(&self) -> Option<StrandMaterial> {
+        let (stiffness, damping) = (self.stiffness.unwrap_or(1.0), self.damping.unwrap_or(1.0));
+        let is_given = self.stiffness.is_some() || self.damping.is_some();
+        is_given.then_some(StrandMaterial { stiffness, damping })
+    }
+
     /// Length along its nodes (m).
     pub fn length(&self) -> f32 {
         self.points.windows(2).map(|p| p[0].distance(p[1])).sum()
@@ -464,9 +487,14 @@ impl GroomStrand<'_> {
             }
         }
         if let Some(share) = self.stiffness
-            && StrandStiffness::SHARE.check(share).is_err()
+            && StrandMaterial::STIFFNESS.check(share).is_err()
         {
             return wrong(Groom::STIFFNESS, 0, share, "a share of 0.01 to 100");
+        }
+        if let Some(share) = self.damping
+            && StrandMaterial::DAMPING.check(share).is_err()
+        {
+            return wrong(Groom::DAMPING, 0, share, "a share of 0 to 100");
         }
         let uv = self.uv.unwrap_or_default().to_array();
         match uv.into_iter().find(|part| !part.is_finite()) {

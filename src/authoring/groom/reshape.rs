@@ -5,12 +5,18 @@ use super::{
     losses::GroomPlace,
 };
 use crate::base::setting::ValueRange;
-use bevy::{math::Affine3A, prelude::*};
+use bevy::{
+    math::{Affine3A, DVec3},
+    prelude::*,
+};
 use core::ops::Range;
 
 const SCALE: ValueRange = GroomSettings::SCALE.named("a groom's scale");
 const NODES: ValueRange = GroomSettings::NODES.named("nodes to resample to");
 const SHORTEST: ValueRange = GroomSettings::SHORTEST_SEGMENT.named("the shortest segment (m)");
+const OVER: ValueRange =
+    ValueRange::new("the length of a curl (m)", 1e-6..=1e6, "give the length of hair in one turn");
+const CURL: ValueRange = ValueRange::new("a share of the curl", 0.0..=10.0, "1 is as it is");
 const EVERY: ValueRange = GroomSettings::KEEP_EVERY.named("keep every k-th strand, k");
 
 impl Groom {
@@ -138,6 +144,57 @@ impl Groom {
         Ok((made, losses))
     }
 
+    /// The groom with another curl: each strand's bends around its middle line count `shares` times. 0 is the middle line,
+    /// 1 as it is, 2 twice as curly. Strands keep their lengths, so that a curl that is taken out hangs lower; roots
+    /// stay. The middle line goes along the mean direction of `over` metres of a strand, at best one turn of its curl or
+    /// wave: with less, wide curls stay, with more, the fall over the head straightens, too. 0.04 suits most.
+    ///
+    /// ```
+    /// # use bevy_keratin::{prelude::*, authoring::groom::*, authoring::plant::ImageMap};
+    /// /// Straight where the map is black, as the artist made it where it is white.
+    /// fn relaxed(groom: &Groom, map: &ImageMap) -> Result<Groom, GroomError> {
+    ///     let shares = groom.strands().map(|strand| strand.uv.map_or(1.0, |uv| map.at(uv)));
+    ///     groom.with_curl(0.04, &shares.collect::<Vec<_>>())
+    /// }
+    /// ```
+    ///
+    /// # Errors
+    /// When there are not as many shares as strands, one is outside 0 to 10, or `over` is not above 0.
+    pub fn with_curl(&self, over: f32, shares: &[f32]) -> Result<Self, GroomError> {
+        OVER.check(over)?;
+        let (found, expected) = (shares.len(), self.len());
+        if found != expected {
+            return Err(GroomError::Length { what: "curl", found, expected });
+        }
+        let mut made = self.clone();
+        let (mut along, mut ways) = (Vec::new(), Vec::new());
+        for (i, (strand, share)) in self.strands().zip(shares).enumerate() {
+            CURL.check(*share)?;
+            let length = arc_lengths(strand.points, &mut along);
+            if *share == 1.0 || length == 0.0 {
+                continue;
+            }
+            let way = |p: &[Vec3]| p[1].as_dvec3() - p[0].as_dvec3();
+            ways.clear();
+            ways.extend(strand.points.windows(2).map(way));
+            let window = f64::from(over).min(length);
+            let first = self.nodes_of(i).start;
+            let mut at = strand.points[0].as_dvec3();
+            for (k, way) in ways.iter().enumerate() {
+                let size = way.length();
+                // A whole window, also at the ends.
+                let begin = (0.5 * (along[k] + along[k + 1] - window)).clamp(0.0, length - window);
+                let between = |at| point_at(strand.points, place(&along, at));
+                let mean = (between(begin + window) - between(begin)) / window;
+                let own = way.normalize_or_zero();
+                let turned = mean + (own - mean) * f64::from(*share);
+                at += turned.try_normalize().unwrap_or(own) * size;
+                made.points[first + k + 1] = at.as_vec3();
+            }
+        }
+        made.checked()
+    }
+
     /// Every `k`-th strand, the first one included.
     ///
     /// # Errors
@@ -206,6 +263,7 @@ impl Groom {
         self.uvs.extend(of.uvs.get(i));
         self.guides.extend(of.guides.get(i));
         self.stiffness.extend(of.stiffness.get(i));
+        self.damping.extend(of.damping.get(i));
         self.groups.extend(of.groups.get(i));
         self.bones.strands.extend(of.bones.strands.get(i));
         Ok(())
@@ -222,6 +280,11 @@ pub(super) fn arc_lengths(points: &[Vec3], along: &mut Vec<f64>) -> f64 {
         length
     }));
     length
+}
+
+/// The place at a parameter of a segment.
+fn point_at(points: &[Vec3], (segment, t): (usize, f32)) -> DVec3 {
+    points[segment].as_dvec3().lerp(points[segment + 1].as_dvec3(), t.into())
 }
 
 /// The segment at a distance along a strand, and the parameter within it.

@@ -55,6 +55,7 @@ impl Plugin for PlantPlugin {
         app.register_type::<Planting>()
             .register_type::<Planted>()
             .register_type::<HairPreset>()
+            .register_type::<Hairline>()
             .register_type::<PresetSettings>()
             .register_type::<Scalp>()
             .register_type::<ImageMap>()

@@ -3,14 +3,12 @@
 use super::{
     error::WearError,
     fall::Fall,
-    make::{HairInput, Made, MakeInput, make},
+    make::{HairInput, Made, MakeInput, Source, make},
     part::{Cue, MeshPart},
     target::{OwnSolid, Target},
     what::{HairSource, WearHair},
 };
-use crate::{
-    authoring::groom::Groom, forces::contact::HairCollider, simulation::settle::SettleConditions,
-};
+use crate::{forces::contact::HairCollider, simulation::settle::SettleConditions};
 use bevy::{
     ecs::entity::EntityHashMap,
     math::{Affine3A, Mat3A, Vec3A},
@@ -104,13 +102,19 @@ impl Likeness {
     /// The entities of another target for those of this one, where it gets the same hair.
     fn map_to(&self, other: &Self) -> Option<EntityHashMap<Entity>> {
         let is_same_size = (self.size / other.size).ln().abs() < SAME_SIZE;
-        let points = |groom: &Groom| groom.points().as_ptr();
-        let hair = |of: &HairInput| (of.groom.as_ref().map(points), of.is_kept);
+        let is_same = |a: &Source, b: &Source| match (a, b) {
+            (Source::Groom(a), Source::Groom(b)) => a.points().as_ptr() == b.points().as_ptr(),
+            (Source::Recipe(a), Source::Recipe(b)) => a == b,
+            _ => false,
+        };
+        let are_same = |(a, b): (&HairInput, &HairInput)| {
+            a.is_kept == b.is_kept && is_same(&a.source, &b.source)
+        };
         let before = |of: &Self| of.before.iter().map(Arc::as_ptr).collect::<Vec<_>>();
         let counts = |of: &Self| [of.entities.len(), of.parts.len(), of.own.len()];
         // An animation has moved the character within its own space.
         let is_free = self.wear.scalp.is_none()
-            && self.wear.sources().all(|hair| matches!(hair, HairSource::Preset(_)));
+            && self.wear.sources().all(|hair| !matches!(hair, HairSource::Groom { .. }));
         let at = |of: &Self| of.parts.first().map_or(default(), |part| part.at);
         let by = if is_free { at(self) - at(other) } else { default() };
         let is_like = is_same_size
@@ -118,7 +122,8 @@ impl Likeness {
             && self.down == other.down
             && self.shades == other.shades
             && before(self) == before(other)
-            && self.hairs.iter().map(hair).eq(other.hairs.iter().map(hair))
+            && self.hairs.len() == other.hairs.len()
+            && self.hairs.iter().zip(&other.hairs).all(are_same)
             && self.wear == other.wear
             && self.conditions == other.conditions
             && self.parts.iter().zip(&other.parts).all(|(a, b)| a.is_like(b, by));

@@ -30,15 +30,17 @@ use crate::{
         },
         groom::{Groom, GroomGuides, GrownStrands},
         plant::{
-            HUMAN_DENSITY, HairPreset, Planting, PresetSettings, RootOnMesh, RootPlace,
-            SurfacePoint, surface_points,
+            HUMAN_DENSITY, Planting, PresetSettings, RootOnMesh, RootPlace, SurfacePoint,
+            surface_points,
         },
+        recipe::HairRecipe,
     },
     base::{fault::HairFault, grid::KdTree},
-    forces::contact::HairCollider,
+    forces::contact::{HairCollider, StrandContact},
     hair::{look::WornPreset, strand::Strand},
     keratin::bond::Bonds,
     simulation::settle::{SettleAhead, SettleConditions, Settled},
+    solver::rod::{HairStiffness, StrandMaterial},
     water::HairWetting,
 };
 use bevy::{
@@ -89,11 +91,18 @@ const MAX_ROOT_DISTANCE: f32 = 0.03;
 const UNITS: [f32; 7] = [0.01, 0.001, 0.0254, 0.1, 10.0, 100.0, 1000.0];
 const WIDTHS: core::ops::RangeInclusive<f32> = 0.06..=3.0;
 
+/// What a [`HairSource`] names, loaded.
+#[derive(Clone)]
+pub(super) enum Source {
+    Groom(Groom),
+    /// Also of a preset.
+    Recipe(HairRecipe),
+}
+
 /// What one hair of a wear is made of.
 #[derive(Clone)]
 pub(super) struct HairInput {
-    /// The groom, where one is worn.
-    pub(super) groom: Option<Groom>,
+    pub(super) source: Source,
     /// Whether it is worn already: colliders leave room for it.
     pub(super) is_kept: bool,
 }
@@ -151,8 +160,8 @@ pub(super) struct MadeHair {
     pub(super) roots: Vec<RootOnMesh>,
     /// Its strands at rest, with their bonds, how they fell if that was found out, and what was reported meanwhile.
     pub(super) strands: Vec<(Strand, Bonds)>,
-    /// How stiff each is beside the others; empty where all are alike.
-    pub(super) stiffness: Vec<f32>,
+    /// What each is beside the others; empty where all are alike.
+    pub(super) materials: Vec<StrandMaterial>,
     pub(super) fall: Option<Arc<Fall>>,
     /// Whether it took over how other hair lay.
     pub(super) is_carried: bool,
@@ -164,6 +173,7 @@ pub(super) struct MadeHair {
     pub(super) shells: Option<Vec<Shell>>,
     pub(super) settings: Option<PresetSettings>,
     pub(super) preset: Option<WornPreset>,
+    pub(super) recipe: Option<HairRecipe>,
     #[cfg(feature = "render")]
     pub(super) look: Option<HairLook>,
     /// Fibres for each strand.
@@ -367,7 +377,7 @@ fn finish(
     MadeHair {
         roots: grown.roots,
         strands: rested.strands,
-        stiffness: grown.hair.stiffness,
+        materials: grown.hair.materials,
         fall,
         is_carried,
         faults: rested.faults,
@@ -377,6 +387,7 @@ fn finish(
         followers: grown.hair.followers,
         settings: grown.settings,
         preset: grown.preset,
+        recipe: grown.recipe,
         #[cfg(feature = "render")]
         look: grown.look,
         fibres: grown.fibres.clamp(*fibres.start(), *fibres.end()),
@@ -427,8 +438,8 @@ fn settle(
     let down = fitting.from_wearer.transform_vector3(order.down()) / scale;
     let ahead = SettleAhead {
         strands: &grown.hair.strands,
-        stiffness: &grown.hair.stiffness,
-        own: grown.settings.as_ref().map(|settings| (settings.stiffness, settings.contact)),
+        materials: &grown.hair.materials,
+        own: grown.settles_as,
         solids: &solids,
         size: size / scale,
         gravity: down,
@@ -480,8 +491,11 @@ fn old_hair(fitting: &Fitting, parts: &[MeshPart]) -> Vec<Entity> {
 struct Grown {
     hair: GrownStrands,
     roots: Vec<RootOnMesh>,
+    /// Before a recipe has changed them, and what of them counts as it settles, after that.
     settings: Option<PresetSettings>,
+    settles_as: Option<(HairStiffness, StrandContact)>,
     preset: Option<WornPreset>,
+    recipe: Option<HairRecipe>,
     #[cfg(feature = "render")]
     look: Option<HairLook>,
     fibres: f32,
@@ -489,29 +503,33 @@ struct Grown {
 
 /// Grows one hair of a wear. One that is kept draws none: only its roots count.
 fn grow(wear: &WearHair, input: &HairInput, fitting: &Fitting) -> Result<Grown, WearError> {
-    match (&wear.hair, &input.groom) {
-        (HairSource::Groom { guides, .. }, Some(groom)) => {
+    match (&wear.hair, &input.source) {
+        (HairSource::Groom { guides, .. }, Source::Groom(groom)) => {
             from_groom(groom, guides, fitting, &wear.place)
         }
-        (HairSource::Groom { .. }, None) => Err(WearError::NoMesh),
-        (HairSource::Preset(preset), _) => plant(*preset, wear, fitting, !input.is_kept),
+        (_, Source::Groom(groom)) => {
+            from_groom(groom, &GroomGuides::default(), fitting, &wear.place)
+        }
+        (_, Source::Recipe(recipe)) => plant(recipe, wear, fitting, !input.is_kept),
     }
 }
 
 #[cfg_attr(not(feature = "render"), allow(unused_variables, reason = "followers are drawn"))]
 fn plant(
-    preset: HairPreset,
+    recipe: &HairRecipe,
     wear: &WearHair,
     fitting: &Fitting,
     is_drawn: bool,
 ) -> Result<Grown, WearError> {
     let length = WornPreset::LENGTH.named("WearHair::length").check(wear.length)?;
+    let preset = recipe.preset();
     let worn = WornPreset { seed: wear.seed, length, ..WornPreset::of(preset) };
-    let mut planting = Planting { seed: wear.seed, ..preset.planting(&fitting.scalp) };
+    let mut planting = Planting { seed: wear.seed, ..recipe.planting(&fitting.scalp) };
     let own_length = planting.length;
     if worn.length != 1.0 {
         planting = planting.lengthened(worn.length);
     }
+    let settings = recipe.settings();
     let whole = preset.is_everywhere();
     let within = |reach: f32| match whole {
         true => fitting.mesh.clone(),
@@ -538,8 +556,8 @@ fn plant(
             preset,
             scalp: fitting.scalp,
             hairline: (wear.hairline.map(Ranged::checked).transpose()?)
-                .unwrap_or_else(|| preset.hairline()),
-            count: if is_drawn { preset.settings().followers.count } else { 0 },
+                .map_or_else(|| recipe.hairline().checked(), Ok)?,
+            count: if is_drawn { settings.followers.count } else { 0 },
             seed: wear.seed,
         }
         .plant(&planted, &mesh, &of_head)?,
@@ -549,7 +567,10 @@ fn plant(
         hair,
         roots: planted.roots,
         settings: Some(preset.settings()),
-        preset: Some(worn),
+        settles_as: Some((settings.stiffness, settings.contact)),
+        // What a preset grows is known by its name; what a recipe grows, by the recipe.
+        preset: matches!(wear.hair, HairSource::Preset(_)).then_some(worn),
+        recipe: matches!(wear.hair, HairSource::Recipe(_)).then(|| recipe.clone()),
         #[cfg(feature = "render")]
         look: None,
         fibres: HUMAN_DENSITY / planting.density,
@@ -577,7 +598,9 @@ fn from_groom(
         hair,
         roots,
         settings: None,
+        settles_as: None,
         preset: None,
+        recipe: None,
         #[cfg(feature = "render")]
         look: groom.look(),
     })

@@ -5,7 +5,7 @@ use super::{
     error::{SEARCH_TIME, WearError},
     facing::FacingFrom,
     fall::Fall,
-    make::{HairInput, Made, MadeHair, MakeInput, RefitInput, Rooted, Solids, refit},
+    make::{HairInput, Made, MadeHair, MakeInput, RefitInput, Rooted, Solids, Source, refit},
     missing::missing_asset,
     target::{Characters, Fitted, Search, Target},
     what::{HairNotWorn, HairSource, HairWorn, WearHair, WornAs},
@@ -16,6 +16,7 @@ use crate::{
     authoring::{
         attach::{OtherMesh, RootsOnMesh, TiedRoots},
         groom::Groom,
+        recipe::{FollowRecipe, Followed, HairRecipe, apply},
     },
     base::{
         fault::{FaultKind, HairFault},
@@ -27,7 +28,6 @@ use crate::{
         worn::{PassedTypes, Wearer, WornBy, WornHair},
     },
     hairdo::style::{HairStyle, KeptStyle},
-    keratin::bond::StrandStiffness,
     simulation::settle::{SettleConditions, Settled, Settling},
     water::HairWetting,
 };
@@ -105,7 +105,7 @@ struct Found {
     wear: WearHair,
     target: Target,
     /// For each hair.
-    grooms: Vec<Option<Groom>>,
+    sources: Vec<Source>,
 }
 
 impl Wearing {
@@ -192,18 +192,18 @@ pub(super) fn detect_changes(
     mut commands: Commands,
     mut wearers: Query<(Ref<WearHair>, &mut Wearing)>,
     time: Option<Res<Time<Virtual>>>,
-    mut events: Option<MessageReader<AssetEvent<Groom>>>,
-    mut hairs: Query<(&mut WornAs, &mut TiedRoots), With<Hair>>,
+    (mut events, mut recipe_events): (
+        Option<MessageReader<AssetEvent<Groom>>>,
+        Option<MessageReader<AssetEvent<HairRecipe>>>,
+    ),
+    recipes: Option<Res<Assets<HairRecipe>>>,
+    mut hairs: Query<(&mut WornAs, &mut TiedRoots, Option<&Followed>), With<Hair>>,
     (members, strands): (Query<&Strands>, Query<Ref<Strand>>),
 ) {
-    let changed: HashSet<_> = events
-        .iter_mut()
-        .flat_map(|events| events.read())
-        .filter_map(|event| match event {
-            AssetEvent::Modified { id } => Some(*id),
-            _ => None,
-        })
-        .collect();
+    let changed: HashSet<_> =
+        events.iter_mut().flat_map(|events| events.read()).filter_map(modified).collect();
+    let recipe_events = recipe_events.iter_mut().flat_map(|events| events.read());
+    let changed_recipes: HashSet<_> = recipe_events.filter_map(modified).collect();
     let stands_still = time.is_some_and(|time| time.is_paused());
     let is_written = |hair: Entity| {
         let mut own = strands.iter_many(members.get(hair).into_iter().flat_map(Strands::iter));
@@ -220,7 +220,7 @@ pub(super) fn detect_changes(
         let is_worn = !wearing.worn.is_empty() && matches!(wearing.stage, WearStage::Done);
         if is_other && is_worn && is_same() {
             for (own, wear) in wearing.worn.iter().zip(wear.each()) {
-                if let Ok((mut worn, _)) = hairs.get_mut(own.hair) {
+                if let Ok((mut worn, ..)) = hairs.get_mut(own.hair) {
                     restyle(&mut commands, own.hair, &mut worn, wear);
                 }
             }
@@ -237,33 +237,48 @@ pub(super) fn detect_changes(
             wearing.lags = !wearing.wanted.as_ref().is_some_and(|old| old.is_same_hair(&wear));
             is_other = false;
         }
-        let is_reloaded = |hair: &HairSource| match hair {
+        // A recipe that only sets hair that has grown otherwise makes none.
+        let is_reloaded = |hair: &HairSource, has: Option<&Followed>| match hair {
             HairSource::Groom { groom, .. } => changed.contains(&groom.id()),
+            HairSource::Recipe(recipe) => {
+                let now = recipes.as_ref().and_then(|recipes| recipes.get(recipe));
+                let grows_alike = || has.zip(now).is_some_and(|(has, now)| has.grows_like(now));
+                changed_recipes.contains(&recipe.id()) && !grows_alike()
+            }
             HairSource::Preset(_) => false,
         };
         let is_overdue = wearing.lags && matches!(wearing.stage, WearStage::Done);
         let is_done = matches!(wearing.stage, WearStage::Done);
         let (mut is_gone, mut has_lost_roots) = (false, false);
+        let mut reloaded = is_making && wear.sources().any(|hair| is_reloaded(hair, None));
         for own in &mut wearing.bypass_change_detection().worn {
-            let Ok((worn, mut tied)) = hairs.get_mut(own.hair) else {
+            let Ok((worn, mut tied, followed)) = hairs.get_mut(own.hair) else {
                 is_gone = true;
                 continue;
             };
-            own.is_stale |= is_reloaded(&worn.wear.hair);
+            let is_other = is_reloaded(&worn.wear.hair, followed);
+            (own.is_stale, reloaded) = (own.is_stale || is_other, reloaded || is_other);
             if is_done && tied.bypass_change_detection().take_lost() {
                 (own.is_stale, has_lost_roots) = (true, true);
             }
         }
-        let is_reloaded = wear.sources().any(is_reloaded);
         let is_to_settle = is_carried && !wearing.settles;
-        if is_reloaded && is_making {
+        if reloaded && is_making {
             wearing.lags = true;
-        } else if is_other || is_overdue || is_reloaded || has_lost_roots || (is_gone && is_done) {
+        } else if is_other || is_overdue || reloaded || has_lost_roots || (is_gone && is_done) {
             wearing.begin(&wear);
         } else if is_done && wear.at.is_none() && is_to_settle {
             wearing.begin(&wear);
             wearing.settles = true;
         }
+    }
+}
+
+/// The asset of an event that says that it is another.
+fn modified<A: Asset>(event: &AssetEvent<A>) -> Option<AssetId<A>> {
+    match event {
+        AssetEvent::Modified { id } => Some(*id),
+        _ => None,
     }
 }
 
@@ -300,6 +315,7 @@ pub(super) struct Finder<'w, 's> {
     time: Option<Res<'w, Time<Real>>>,
     characters: Characters<'w, 's>,
     grooms: Option<Res<'w, Assets<Groom>>>,
+    recipes: Option<Res<'w, Assets<HairRecipe>>>,
     wearers: Wearers<'w, 's>,
     faults: MessageWriter<'w, HairFault>,
 }
@@ -312,7 +328,8 @@ pub(super) fn find_heads(finder: Finder) {
 impl Finder<'_, '_> {
     /// All, in the time that a frame has for it; or those of hair that is due by now.
     fn find(self, due: Option<Duration>) {
-        let Self { mut commands, time, characters, grooms, mut wearers, mut faults } = self;
+        let Self { mut commands, time, characters, grooms, recipes, mut wearers, mut faults } =
+            self;
         // The wearer of a preset on each head.
         let mut taken: HashMap<Entity, Entity> = (wearers.iter())
             .filter(|(_, wear, _)| has_preset(wear))
@@ -344,18 +361,22 @@ impl Finder<'_, '_> {
                 }
                 WearStage::Searching { seconds: SEARCH_TIME, reported: true }
             };
-            let groom = |hair: &HairSource| match hair {
-                HairSource::Preset(_) => Ok(None),
+            let source = |hair: &HairSource| match hair {
+                HairSource::Preset(preset) => Ok(Source::Recipe((*preset).into())),
                 HairSource::Groom { groom, .. } => {
                     let loaded = grooms.as_ref().and_then(|grooms| grooms.get(groom));
-                    loaded.cloned().map(Some).ok_or(groom.id())
+                    loaded.cloned().map(Source::Groom).ok_or(("groom", groom.id().untyped()))
+                }
+                HairSource::Recipe(recipe) => {
+                    let loaded = recipes.as_ref().and_then(|recipes| recipes.get(recipe));
+                    loaded.cloned().map(Source::Recipe).ok_or(("recipe", recipe.id().untyped()))
                 }
             };
-            let grooms = match wear.sources().map(groom).collect::<Result<Vec<_>, _>>() {
-                Ok(grooms) => grooms,
-                Err(missing) => {
-                    wearing.stage = match characters.failure(missing.untyped()) {
-                        Some(reason) => failed(WearError::NotLoaded { what: "groom", reason }),
+            let sources = match wear.sources().map(source).collect::<Result<Vec<_>, _>>() {
+                Ok(sources) => sources,
+                Err((what, missing)) => {
+                    wearing.stage = match characters.failure(missing) {
+                        Some(reason) => failed(WearError::NotLoaded { what, reason }),
                         None => WearStage::Searching { seconds, reported },
                     };
                     continue;
@@ -381,7 +402,7 @@ impl Finder<'_, '_> {
                             }
                             wearing.head = Some(target.head);
                             let wear = wear.clone();
-                            WearStage::Found(Box::new(Found { wear, target, grooms }))
+                            WearStage::Found(Box::new(Found { wear, target, sources }))
                         }
                     }
                 }
@@ -395,7 +416,7 @@ impl Finder<'_, '_> {
 }
 
 fn has_preset(wear: &WearHair) -> bool {
-    wear.sources().any(|hair| matches!(hair, HairSource::Preset(_)))
+    wear.sources().any(|hair| !matches!(hair, HairSource::Groom { .. }))
 }
 
 /// Starts to make hair for heads that were found.
@@ -416,9 +437,9 @@ pub(super) fn start(world: &mut World, all: &mut QueryState<(Entity, &mut Wearin
         let kept = kept(world, wearing, &found);
         let falls = wearing.worn.iter().filter(|_| !wearing.settles);
         let before = falls.filter_map(|worn| worn.fall.clone()).collect();
-        let Found { wear, target, grooms } = *found;
-        let hairs = grooms.into_iter().zip(&kept);
-        let hairs = hairs.map(|(groom, kept)| HairInput { groom, is_kept: kept.is_some() });
+        let Found { wear, target, sources } = *found;
+        let hairs = sources.into_iter().zip(&kept);
+        let hairs = hairs.map(|(source, kept)| HairInput { source, is_kept: kept.is_some() });
         let hairs = hairs.collect();
         let conditions = SettleConditions::of(world, wearer);
         #[cfg(feature = "render")]
@@ -570,7 +591,7 @@ impl Hairdresser<'_, '_> {
                         is_carried: new.is_carried,
                         fall: fall.or_else(|| before.get(which)?.fall.clone()),
                         // A groom that was loaded again meanwhile.
-                        is_stale: wearing.lags && matches!(wear.hair, HairSource::Groom { .. }),
+                        is_stale: wearing.lags && !matches!(wear.hair, HairSource::Preset(_)),
                         hair: self.spawn(wearer, &made, new, wear, which),
                     };
                     #[cfg(feature = "save")]
@@ -612,9 +633,9 @@ impl Hairdresser<'_, '_> {
         kept: &[Option<Entity>],
     ) -> Vec<Option<Regrowth>> {
         let taken = before.iter().zip(wanted.each()).zip(kept).map(|((worn, wear), kept)| {
-            let is_groom = matches!(wear.hair, HairSource::Groom { .. });
+            let is_asset = !matches!(wear.hair, HairSource::Preset(_));
             let (was, _) = self.hairs.get(worn.hair).ok()?;
-            let is_same = is_groom && kept.is_none() && was.wear.is_same_hair(&wear);
+            let is_same = is_asset && kept.is_none() && was.wear.is_same_hair(&wear);
             is_same.then(|| Regrowth::take(&mut self.commands, worn.hair, |_| true))
         });
         taken.collect()
@@ -668,16 +689,18 @@ impl Hairdresser<'_, '_> {
         let strands =
             new.strands.into_iter().map(move |(strand, bonds)| (StrandOf(hair), strand, bonds));
         let strands = strands.collect::<Vec<_>>();
-        if new.stiffness.is_empty() {
+        if new.materials.is_empty() {
             self.commands.spawn_batch(strands);
         } else {
-            let own = new.stiffness.into_iter().map(|share| StrandStiffness { share });
-            self.commands.spawn_batch(strands.into_iter().zip(own).collect::<Vec<_>>());
+            self.commands.spawn_batch(strands.into_iter().zip(new.materials).collect::<Vec<_>>());
         }
         let mut own = self.commands.entity(hair);
         #[cfg(feature = "save")]
         if let Some(hairdo) = wear.hairdo {
             own.queue(hairdo.into_fitting_command());
+        }
+        if let (Some(recipe), HairSource::Recipe(handle)) = (new.recipe, &wear.hair) {
+            own.insert(FollowRecipe(handle.clone())).queue(apply(recipe));
         }
         // These override the hairdo's.
         if let Some(look) = wear.look {

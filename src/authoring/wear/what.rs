@@ -7,6 +7,7 @@ use crate::{
     authoring::{
         groom::{Groom, GroomGuides},
         plant::{HairPreset, Hairline, Scalp},
+        recipe::HairRecipe,
     },
     hair::look::{HairDye, HairLook},
     hairdo::style::HairStyle,
@@ -23,12 +24,14 @@ use core::time::Duration;
 ///
 /// ```
 /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-/// # fn wear(mut commands: Commands, character: Entity, groom: Handle<Groom>) {
+/// # fn wear(mut commands: Commands, character: Entity, groom: Handle<Groom>, recipe: Handle<HairRecipe>) {
 /// // On the head, found by its bone's name:
 /// commands.entity(character).insert(WearHair::new(HairPreset::Curly));
 /// // On another bone, on the mesh of this name, in place of the hair that the character came with:
 /// let bob = WearHair::new(HairPreset::Bob).on("skull").on_mesh("Face").hiding_old_hair();
 /// commands.entity(character).insert(bob);
+/// // A preset with settings of a file, which is followed when it changes:
+/// commands.entity(character).insert(WearHair::of_recipe(recipe));
 /// // What an artist made for this character:
 /// commands.entity(character).insert(WearHair::new(groom));
 /// // A beard beside it, of another colour:
@@ -180,6 +183,11 @@ impl WearHair {
         Self { hair: hair.into(), ..default() }
     }
 
+    /// Hair of a [`HairRecipe`], a preset changed by a file.
+    pub fn of_recipe(recipe: Handle<HairRecipe>) -> Self {
+        Self::new(HairSource::Recipe(recipe))
+    }
+
     /// The same with another hair beside it: a preset, a groom, or a [`HairBeside`] with its own length and colour.
     ///
     /// ```
@@ -280,6 +288,7 @@ impl WearHair {
         let all: Vec<_> = self.each().collect();
         let is_same = |a: &Self, b: &Self| match (&a.hair, &b.hair) {
             (HairSource::Preset(a), HairSource::Preset(b)) => a == b,
+            (HairSource::Recipe(a), HairSource::Recipe(b)) => a == b,
             (HairSource::Groom { groom: of, .. }, HairSource::Groom { groom, .. }) => {
                 of == groom && a.place == b.place
             }
@@ -292,6 +301,9 @@ impl WearHair {
             HairSource::Groom { groom, .. } => groom
                 .path()
                 .map_or_else(|| "a groom".to_owned(), |path| format!("the groom {path}")),
+            HairSource::Recipe(recipe) => recipe
+                .path()
+                .map_or_else(|| "a recipe".to_owned(), |path| format!("the recipe {path}")),
         };
         Err(WearError::Twice { hair })
     }
@@ -466,6 +478,8 @@ pub enum HairSource {
         /// Which of its strands are simulated, and how finely.
         guides: GroomGuides,
     },
+    /// Planted by a [`HairRecipe`] asset; waits until it is loaded, and follows reloads.
+    Recipe(Handle<HairRecipe>),
 }
 
 impl Default for HairSource {
@@ -527,11 +541,11 @@ pub struct WornAs {
 }
 
 impl WornAs {
-    /// Which preset it is; `None` for a groom.
+    /// Which preset it is; `None` for a groom or a recipe.
     pub fn preset(&self) -> Option<HairPreset> {
         match self.wear.hair {
             HairSource::Preset(preset) => Some(preset),
-            HairSource::Groom { .. } => None,
+            HairSource::Groom { .. } | HairSource::Recipe(_) => None,
         }
     }
 }

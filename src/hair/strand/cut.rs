@@ -72,6 +72,10 @@ impl Strand {
     /// [`SHORTEST_END`] has to stay.
     pub(crate) fn cut(&mut self, place: StrandPlace, cut: &mut CutStrand) -> bool {
         let StrandPlace { edge, share } = place;
+        // What an inspector has written is repaired in the next tick.
+        if !self.has_nodes(self.nodes()) {
+            return false;
+        }
         let Some(length) = self.rest_lengths.get(edge).map(|length| length * share) else {
             return false;
         };

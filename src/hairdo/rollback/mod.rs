@@ -111,7 +111,8 @@ impl HairSnapshots<'_, '_> {
     }
 
     /// Puts a snapshot back on a [`Hair`] of as many strands of as many nodes, or on the one that an entity wears.
-    /// Settings and transforms count as they are then: put them back before.
+    /// Settings and transforms count as they are then: put them back before. Where the water of the world is not put back
+    /// with it, the next tick balances it.
     ///
     /// # Errors
     /// As [`take`](Self::take), and when the snapshot is of other strands. The hair then stays as it is.
@@ -120,7 +121,9 @@ impl HairSnapshots<'_, '_> {
         let conditions = self.settings.of(hair);
         let tick = self.motion.moment();
         let state = self.hairs.get_mut(hair).map_err(|_| SnapshotError::NoHair { entity: hair })?;
-        snapshot.restore(state, &mut self.strands, conditions, tick)
+        snapshot.restore(state, &mut self.strands, conditions, tick)?;
+        self.shared.hair_was_restored();
+        Ok(())
     }
 
     /// Takes what all hair shares into a `snapshot` whose memory is reused.

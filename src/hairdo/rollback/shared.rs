@@ -42,6 +42,15 @@ pub(super) struct SharedState<'w, 's> {
     poses: Query<'w, 's, (Entity, &'static mut TickPose), Without<Hair>>,
 }
 
+impl SharedState<'_, '_> {
+    /// Hair was put back, perhaps without what all hair shares: the next tick balances the water.
+    pub(super) fn hair_was_restored(&mut self) {
+        if let Some(found) = &mut self.found {
+            found.bypass_change_detection().is_restored = true;
+        }
+    }
+}
+
 impl HairWorldSnapshot {
     /// The snapshot as bytes, for a file or another process of the same world.
     pub fn to_bytes(&self) -> Vec<u8> {

@@ -21,5 +21,5 @@ pub use bonds::{BondChanges, Bonds};
 pub use kind::BondKind;
 pub use model::JointBonds;
 pub use rest::RestShape;
-pub use settings::{BondInfluence, Cuticle, StrandStiffness};
+pub use settings::{BondInfluence, Cuticle};
 pub use systems::BondPlugin;

@@ -72,27 +72,3 @@ setting! {
             "the paper uses 0.5764";
     }
 }
-
-setting! {
-    /// How stiff a strand is beside others of its hair. Component of a [`Strand`](crate::Strand); strands without one are
-    /// as stiff as [`HairStiffness`](crate::HairStiffness) says. Hair grown from a groom with
-    /// [stiffness](crate::Groom::with_stiffness) has it.
-    ///
-    /// A gravity-bending length grows with the cube root: a strand of 8 has twice that of its hair, and level it sags an
-    /// eighth as far as long as it hardly bends. Strands of springs have it without effect. Its hair is simulated on the CPU.
-    ///
-    /// ```
-    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
-    /// fn fine_hair_at_the_temple(mut commands: Commands, strands: Query<(Entity, &Strand)>) {
-    ///     for (id, strand) in strands.iter().filter(|(_, strand)| strand.positions()[0].x.abs() > 0.07) {
-    ///         commands.entity(id).insert(StrandStiffness { share: 0.3 });
-    ///     }
-    /// }
-    /// ```
-    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
-    #[reflect(Component, Default, Clone, PartialEq)]
-    pub struct StrandStiffness {
-        /// Its bending and twisting stiffness, E I and G J, as a share of its hair's.
-        pub share: f32 = 1.0, in SHARE: 0.01..=100.0, safe 0.1..=10.0, "1 is as stiff as its hair";
-    }
-}

@@ -6,7 +6,7 @@ use super::{
     lanes::{JointFrames, change, remembered_shapes, rest_shapes},
     model::cuticle_factor,
     rest::{Key, RestShape},
-    settings::{BondInfluence, Cuticle, StrandStiffness},
+    settings::{BondInfluence, Cuticle},
 };
 use crate::{
     base::{
@@ -25,7 +25,9 @@ use crate::{
         },
         worn,
     },
-    solver::rod::{HairSolver, SolverMethod, Sweeps, constraint::stiffness_per_iteration},
+    solver::rod::{
+        HairSolver, SolverMethod, StrandMaterial, Sweeps, constraint::stiffness_per_iteration,
+    },
 };
 use bevy::{
     ecs::{entity_disabling::Disabled, query::QueryFilter},
@@ -47,7 +49,7 @@ impl Plugin for BondPlugin {
         }
         worn::setting::<BondInfluence>(app);
         worn::setting::<Cuticle>(app);
-        setting::component::<StrandStiffness>(app);
+        setting::component::<StrandMaterial>(app);
         keep_required::<Strand, Bonds>(app);
         keep_required::<Strand, BondChanges>(app);
         keep_required::<Strand, RestShape>(app);
@@ -126,7 +128,7 @@ fn generate_rest_shapes(
             Ref<Bonds>,
             &AddedMass,
             &mut RestShape,
-            Option<&StrandStiffness>,
+            Option<&StrandMaterial>,
         ),
         SimulatedHere,
     >,
@@ -159,7 +161,7 @@ fn generate_rest_shapes(
             }
             let index = keys.index(of.0, || key_of(of.0));
             let Some(key) = index.map(|index| keys.values[index]) else { continue };
-            let share = own.map_or(1.0, |own| own.clamped().share);
+            let share = own.map_or(1.0, |own| own.clamped().stiffness);
             // Hair with all bonds closed, the usual case, costs only this test.
             if !rest.closed
                 || rest.key != Some(key)

@@ -14,6 +14,7 @@ use bevy::{
     prelude::*,
     render::{
         RenderApp, RenderStartup,
+        diagnostic::RecordDiagnostics,
         render_asset::RenderAssets,
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
@@ -179,9 +180,12 @@ fn count(
     groups.begin_frame();
     let Some((uniform, ribbon)) = expansions.ribbons() else { return };
     let most = device.limits().max_compute_workgroups_per_dimension;
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
     let mut pass = context
         .command_encoder()
         .begin_compute_pass(&ComputePassDescriptor { label: Some("hair volume"), ..default() });
+    let span = diagnostics.pass_span(&mut pass, "hair, volume");
     for hair in expansions.hairs() {
         let Expansion { buffers: [_, _, strands, frame, rings], offset, rings: rings_of, .. } =
             hair;
@@ -238,4 +242,5 @@ fn count(
             pass.dispatch_workgroups(blocks, blocks, blocks);
         }
     }
+    span.end(&mut pass);
 }

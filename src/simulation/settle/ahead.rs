@@ -12,11 +12,11 @@ use crate::{
         environment::{AirDrag, EnvironmentPlugin, HairGravity},
     },
     hair::strand::{Hair, Strand, StrandModel, StrandOf, StrandPlugin},
-    keratin::bond::{BondInfluence, BondPlugin, Bonds, Cuticle, StrandStiffness},
+    keratin::bond::{BondInfluence, BondPlugin, Bonds, Cuticle},
     simulation::solve::{RodPlugin, SpringPlugin},
     solver::{
         mass_spring::Springs,
-        rod::{HairSolver, HairStiffness, Sweeps},
+        rod::{HairSolver, HairStiffness, StrandMaterial, Sweeps},
     },
 };
 use bevy::{
@@ -99,7 +99,7 @@ pub(crate) struct SettleAhead<'a> {
     /// As planted, in the hair's frame.
     pub(crate) strands: &'a [Strand],
     /// How stiff each is beside the others; empty where all are alike.
-    pub(crate) stiffness: &'a [f32],
+    pub(crate) materials: &'a [StrandMaterial],
     /// What the hair has of its own, whatever holds for all hair.
     pub(crate) own: Option<(HairStiffness, StrandContact)>,
     /// Colliders in the hair's frame.
@@ -178,8 +178,8 @@ impl SettleAhead<'_> {
         world.entity_mut(hair).insert(SettleSettings { at_once: AT_ONCE, ..settings });
         let strands = self.strands.iter().map(|strand| (StrandOf(hair), strand.clone()));
         let strands: Vec<Entity> = world.spawn_batch(strands.collect::<Vec<_>>()).collect();
-        for (strand, share) in strands.iter().zip(self.stiffness) {
-            world.entity_mut(*strand).insert(StrandStiffness { share: *share });
+        for (strand, own) in strands.iter().zip(self.materials) {
+            world.entity_mut(*strand).insert(*own);
         }
         for (collider, place) in self.solids {
             world.spawn((collider.clone(), *place, ChildOf(hair)));

@@ -8,7 +8,8 @@ use super::{
 use crate::{
     forces::contact::HairCollider,
     hair::strand::{HairHere, Pose, Strand, Strands},
-    keratin::bond::{Bonds, StrandStiffness},
+    keratin::bond::Bonds,
+    solver::rod::StrandMaterial,
 };
 use bevy::{
     ecs::system::SystemState,
@@ -69,7 +70,7 @@ pub(super) fn settle_elsewhere(
 /// A hair with its surroundings, as they are now.
 struct Work {
     strands: Vec<Strand>,
-    stiffness: Vec<f32>,
+    materials: Vec<StrandMaterial>,
     solids: Vec<(HairCollider, Transform)>,
     pose: Pose,
     conditions: SettleConditions,
@@ -81,9 +82,9 @@ impl Work {
         let members = world.get::<Strands>(hair)?.collection();
         let strands = members.iter().filter_map(|member| world.get::<Strand>(*member).cloned());
         let strands: Vec<Strand> = strands.collect();
-        let own = |member: &Entity| world.get::<StrandStiffness>(*member).copied();
-        let stiffness = match members.iter().any(|member| own(member).is_some()) {
-            true => members.iter().map(|member| own(member).unwrap_or_default().share).collect(),
+        let own = |member: &Entity| world.get::<StrandMaterial>(*member).copied();
+        let materials = match members.iter().any(|member| own(member).is_some()) {
+            true => members.iter().map(|member| own(member).unwrap_or_default()).collect(),
             false => Vec::new(),
         };
         let colliders: Vec<_> = world
@@ -102,13 +103,13 @@ impl Work {
         };
         let solids = colliders.into_iter().filter_map(seen).collect();
         let conditions = SettleConditions::of(world, hair);
-        (!strands.is_empty()).then_some(Self { strands, stiffness, solids, pose, conditions })
+        (!strands.is_empty()).then_some(Self { strands, materials, solids, pose, conditions })
     }
 
     fn settle(&self) -> Option<Settled> {
         let ahead = SettleAhead {
             strands: &self.strands,
-            stiffness: &self.stiffness,
+            materials: &self.materials,
             own: None,
             solids: &self.solids,
             size: self.pose.size(),

@@ -26,13 +26,13 @@ use crate::{
         worn,
     },
     keratin::{
-        bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle, StrandStiffness},
+        bond::{BondChanges, BondInfluence, BondPlugin, Bonds, Cuticle},
         treatment::Treatments,
     },
     solver::{
         mass_spring::Springs,
         rod::{
-            HairSolver, HairStiffness, Sweeps,
+            HairSolver, HairStiffness, StrandMaterial, Sweeps,
             obstacle::{Obstacle, Solid},
             shape::Shape,
         },
@@ -72,7 +72,7 @@ impl Plugin for SleepPlugin {
 }
 
 /// A strand is as stiff as its hair again.
-fn wake_softer(lost: On<Remove, StrandStiffness>, mut strands: Query<&mut StrandSleep>) {
+fn wake_softer(lost: On<Remove, StrandMaterial>, mut strands: Query<&mut StrandSleep>) {
     if let Ok(mut sleep) = strands.get_mut(lost.entity) {
         sleep.bypass_change_detection().wake();
     }
@@ -293,7 +293,7 @@ fn update_sleep(
             &mut Strand,
             &mut StrandSleep,
             &mut SleepPose,
-            (Ref<Bonds>, &BondChanges, &AddedMass, Option<Ref<StrandStiffness>>),
+            (Ref<Bonds>, &BondChanges, &AddedMass, Option<Ref<StrandMaterial>>),
             (Option<&Treatments>, Option<&Moisture>, Option<&HeldNodes>),
         ),
         // Followers sleep when their guides do.

@@ -12,7 +12,7 @@ use crate::{
         lanes::{LANES, put_numbers, put_quaternions, put_vectors, put3, put4, simd_level},
         parallel::{Scratch, prefetch, tables},
         schedule::{EffectiveSubsteps, HairSystems, HairTick, SettleTick, lacks},
-        setting::Settings,
+        setting::{Ranged, Settings},
     },
     forces::contact::{Obstacles, StrandContact},
     hair::{
@@ -24,7 +24,7 @@ use crate::{
     },
     keratin::bond::{BondInfluence, BondPlugin, Bonds, RestShape},
     solver::rod::{
-        HairSolver, HairStiffness, SolverMethod, Sweeps,
+        HairSolver, HairStiffness, SolverMethod, StrandMaterial, Sweeps,
         block::BlockLanes,
         direct::{self, DirectParams},
         obstacle::Obstacle,
@@ -79,6 +79,8 @@ enum Method {
 struct RodColumns<'a> {
     rest: &'a RestShape,
     bonds: &'a Bonds,
+    /// As a share of its hair's.
+    damping: f32,
 }
 
 impl<'a> Batched for RodColumns<'a> {
@@ -148,6 +150,7 @@ impl<'a> Batched for RodColumns<'a> {
                 gather_forces(block, sources);
                 direct::split_forces(params.level, block, params.dt);
                 gather_twist(block, sources);
+                block.damping = in_lanes(items, |item| item.own.damping);
                 gather_roots(block, sources, params.frame_delta.unwrap_or_default());
                 direct::weigh(params.level, block, params.bending_length, params.dt);
                 if attempt == Attempt::Second {
@@ -176,7 +179,7 @@ fn step_rods(
         (
             (Entity, &StrandOf, &StrandRank, &StrandSleep),
             &mut Strand,
-            &RestShape,
+            (&RestShape, Option<&StrandMaterial>),
             &Bonds,
             &AddedMass,
             (Option<&HeldNodes>, Option<&mut HeldNodesState>),
@@ -233,14 +236,15 @@ fn step_rods(
         nodes,
         &scratch,
         params_of,
-        |((entity, of, rank, sleep), strand, rest, bonds, added, held)| {
+        |((entity, of, rank, sleep), strand, (rest, material), bonds, added, held)| {
             let is_stepped = sleep.is_simulated()
                 && strand.nodes() >= 2
                 && rest.darboux.len() == strand.edges()
                 && rest.stiffness.len() == strand.edges();
             let (entity, hair, rank) = (*entity, of.0, *rank);
             let held = Held::of(held.0, held.1);
-            let own = RodColumns { rest, bonds };
+            let damping = material.map_or(1.0, |material| material.clamped().damping);
+            let own = RodColumns { rest, bonds, damping };
             is_stepped.then_some(Member { entity, hair, rank, strand, added, held, own })
         },
     );

@@ -123,6 +123,8 @@ pub struct BlockLanes {
     /// The scalp's frame at the start of the substep, in the frame of the positions. Direct method only.
     pub root_from: [Lane; 4],
     pub(super) theta: Lane,
+    /// Damping of each strand as a share of the block's. Direct method only.
+    pub(crate) damping: Lane,
     /// Largest twist that counts in the Hessian, as a moment over EI (1/m). Direct method only.
     pub(super) max_twist: Lane,
     /// 1 for lanes that may take more than one Newton step, else 0.
@@ -140,6 +142,7 @@ pub struct BlockLanes {
 impl BlockLanes {
     /// Resizes to strands of `nodes` nodes, reusing allocations.
     pub fn resize(&mut self, nodes: usize) {
+        self.damping = [1.0; LANES];
         self.nodes.resize(nodes, NodeLanes::default());
         self.edges.resize(nodes - 1, EdgeLanes::default());
         self.scratch.resize(nodes - 1, TridiagonalRow::default());

@@ -44,4 +44,4 @@ pub(crate) mod touch;
 pub(crate) mod tridiagonal;
 
 pub use constraint::StretchProjection;
-pub use stiffness::{HairSolver, HairStiffness, SolverMethod, Sweeps};
+pub use stiffness::{HairSolver, HairStiffness, SolverMethod, StrandMaterial, Sweeps};

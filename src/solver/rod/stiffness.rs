@@ -50,6 +50,36 @@ setting! {
     }
 }
 
+setting! {
+    /// How stiff, and how damped, a strand is beside others of its hair. Component of a [`Strand`](crate::Strand); strands
+    /// without one are as [`HairStiffness`] says. Hair grown from a groom with
+    /// [stiffness](crate::Groom::with_stiffness) or [damping](crate::Groom::with_damping) has it.
+    ///
+    /// A gravity-bending length grows with the cube root of the stiffness: a strand of 8 has twice that of its hair, and
+    /// level it sags an eighth as far as long as it hardly bends. Strands of springs have it without effect, and by
+    /// [`SolverMethod::Sweeps`] only the stiffness counts. Its hair is simulated on the CPU.
+    ///
+    /// ```
+    /// # use bevy_keratin::prelude::*; use bevy::prelude::*;
+    /// fn fine_hair_at_the_temple(mut commands: Commands, strands: Query<(Entity, &Strand)>) {
+    ///     for (id, strand) in strands.iter().filter(|(_, strand)| strand.positions()[0].x.abs() > 0.07) {
+    ///         commands.entity(id).insert(StrandMaterial { stiffness: 0.3, ..default() });
+    ///     }
+    /// }
+    /// ```
+    #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
+    #[reflect(Component, Default, Clone, PartialEq)]
+    pub struct StrandMaterial {
+        /// Its bending and twisting stiffness, E I and G J, as a share of its hair's.
+        pub stiffness: f32 = 1.0, in STIFFNESS: 0.01..=100.0, safe 0.1..=10.0,
+            "1 is as stiff as its hair";
+        /// Its [`HairStiffness::damping`], as a share of its hair's. Less than the step damps by itself, see there, has no
+        /// further effect.
+        pub damping: f32 = 1.0, in DAMPING: 0.0..=100.0, safe 0.0..=10.0,
+            "1 swings as long as its hair";
+    }
+}
+
 /// The share of [`HairStiffness::torsion`] that a joint lacks which water has softened by so much: in soaked hair, softened
 /// by 0.33, 0.56. G falls to 0.2 where E falls to 0.45.
 pub(crate) fn wet_twist_loss(softening: f32) -> f32 {

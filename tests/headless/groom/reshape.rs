@@ -285,3 +285,47 @@ fn fifty_thousand_strands_load_in_seconds() {
     assert!(read.as_secs_f32() < 10.0, "{read:?}");
     assert!(start.elapsed().as_secs_f32() < 10.0, "{:?}", start.elapsed());
 }
+
+/// A helix of radius r and pitch P whose bends count s times, along its whole length: of a tangent (cos a, sin a) along and
+/// around its axis is left (cos a, s sin a), over its length.
+#[test]
+fn a_curl_changes_as_its_share_says() {
+    let (radius, pitch, turns, nodes) = (5e-3_f32, 0.02_f32, 6.0_f32, 361);
+    let angle = |k: usize| core::f32::consts::TAU * turns * k as f32 / (nodes - 1) as f32;
+    let down = |k: usize| -pitch * turns * k as f32 / (nodes - 1) as f32;
+    let point = |k: usize| {
+        Vec3::new(radius * angle(k).cos(), down(k), radius * angle(k).sin()) + Vec3::X * 0.3
+    };
+    let line: Vec<Vec3> = (0..nodes).map(point).collect();
+    let groom = Groom::from_polylines([line.clone(), line.clone()]).unwrap();
+    let turn = length(&line) / turns;
+    let (cos, sin) = (pitch / turn, core::f32::consts::TAU * radius / turn);
+    for share in [0.0_f32, 0.5, 2.0] {
+        let made = groom.with_curl(turn, &[share, 1.0]).unwrap();
+        let both: Vec<_> = made.strands().map(|strand| strand.points.to_vec()).collect();
+        assert_eq!(both[1], line, "1 is as it is, to the bit");
+        let made = &both[0];
+        assert_eq!(made[0], line[0], "the root stays");
+        assert!((length(made) / length(&line) - 1.0).abs() < 1e-4, "the length stays");
+        let over = (cos * cos + share * share * sin * sin).sqrt();
+        // Where the window is not cut off by an end.
+        let (from, to) = (60, 300);
+        let fallen = (made[from].y - made[to].y) / (line[from].y - line[to].y);
+        assert!((fallen * over - 1.0).abs() < 0.01, "{share}: falls {fallen}, for {}", 1.0 / over);
+        let inner = &made[from..to];
+        let axis = inner.iter().sum::<Vec3>() / inner.len() as f32;
+        let off = inner.iter().map(|p| (p.xz() - axis.xz()).length()).sum::<f32>();
+        let (found, expected) = (off / inner.len() as f32, radius * share / over);
+        assert!((found - expected).abs() < 0.02 * radius, "{share}: radius {found} for {expected}");
+    }
+    // By the length of the strand at most, and none of a line.
+    let straight = Groom::from_polylines([[Vec3::ZERO, Vec3::Y * 0.1, Vec3::Y * 0.2]]).unwrap();
+    let made = straight.with_curl(10.0, &[3.0]).unwrap();
+    assert!(made.points()[2].distance(Vec3::Y * 0.2) < 1e-6);
+    let point = Groom::from_polylines([[Vec3::ONE; 3]]).unwrap();
+    assert_eq!(point.with_curl(0.04, &[0.0]).unwrap().points(), [Vec3::ONE; 3]);
+    for (over, shares) in [(0.0, &[1.0][..]), (f32::NAN, &[1.0]), (0.1, &[-1.0]), (0.1, &[1.0; 2])]
+    {
+        assert!(straight.with_curl(over, shares).is_err(), "{over} {shares:?}");
+    }
+}

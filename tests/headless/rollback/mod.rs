@@ -179,6 +179,42 @@ fn put_back(app: &mut App, hair: Entity, snapshot: &HairSnapshot) -> Result<(), 
     app.world_mut().run_system_once(restore).unwrap()
 }
 
+/// Without what all hair shares, which has the balance.
+#[test]
+fn water_of_hair_that_is_put_back_alone_is_counted() {
+    let mut app = test_app(60.0);
+    let (wet, _) = one_strand(&mut app, 0.2, 8, Vec3::X);
+    let (dry, _) = one_strand(&mut app, 0.2, 8, Vec3::X);
+    run(&mut app, 0.1);
+    let before = [taken(&mut app, wet).unwrap(), taken(&mut app, dry).unwrap()];
+    let is_balanced = |app: &mut App, held: bool| {
+        for _ in 0..3 {
+            app.update();
+            let ledger = app.world().resource::<WaterLedger>();
+            assert!(ledger.error() < 1e-9, "{:.1e}, {ledger:?}", ledger.error());
+            assert_eq!(ledger.held > 0.0, held, "{ledger:?}");
+        }
+    };
+    app.world_mut().write_message(SoakHair { target: wet, wetness: 0.5 });
+    is_balanced(&mut app, true);
+    let soaked = taken(&mut app, wet).unwrap();
+    put_back(&mut app, dry, &soaked).unwrap();
+    is_balanced(&mut app, true);
+    put_back(&mut app, wet, &before[0]).unwrap();
+    put_back(&mut app, dry, &before[1]).unwrap();
+    is_balanced(&mut app, false);
+    // Into a world that knows of no water.
+    let mut app = test_app(60.0);
+    let (hair, strand) = one_strand(&mut app, 0.2, 8, Vec3::X);
+    run(&mut app, 0.1);
+    put_back(&mut app, hair, &soaked).unwrap();
+    is_balanced(&mut app, true);
+    let volume = |app: &App| app.world().get::<Moisture>(strand).unwrap().volume();
+    let first = volume(&app);
+    run(&mut app, 5.0);
+    assert!(volume(&app) < first, "it dries");
+}
+
 #[test]
 fn what_cannot_be_rolled_back_says_so() {
     let mut app = test_app(60.0);

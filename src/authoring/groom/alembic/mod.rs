@@ -20,7 +20,7 @@
 //! | colours | `groom_color`, else `Cd` |
 //! | guides | `groom_guide`: see [`Groom::with_guides`] |
 //! | groups | `groom_group_id` and `groom_group_name`; else each set of several is one: see [`Groom::groups`] |
-//! | stiffness | `groom_stiffness`, our own: see [`Groom::with_stiffness`] |
+//! | stiffness, damping | `groom_stiffness`, `groom_damping`, our own: see [`Groom::with_stiffness`] |
 //!
 //! Each may be one for the set, one a curve or one a point; sets that have none where others do take the mean
 //! of those (zero for UVs, 1 for stiffness).
@@ -37,8 +37,8 @@ use super::{
     Groom, GroomFileError, GroomLosses,
     bytes::value,
     curve_sets::{
-        Attributes, COLOR, CurveSet, CurveSets, Curves, GROUP, GROUP_NAME, GUIDE, Kind, Knots,
-        Numbers, Param, ROOT_UV, STIFFNESS, WIDTH,
+        Attributes, COLOR, CurveSet, CurveSets, Curves, DAMPING, GROUP, GROUP_NAME, GUIDE, Kind,
+        Knots, Numbers, Param, ROOT_UV, STIFFNESS, WIDTH,
     },
     intake::Intake,
     losses::GroomPlace,
@@ -347,13 +347,15 @@ impl<'a> Reading<'a> {
         let names = names.map_or(Ok(Vec::new()), |names| archive.texts(names, curves.len()))?;
         let mut one =
             |name| Ok::<_, GroomFileError>(self.param(archive.find(own, name)?, 1, curves, path));
-        let (guides, stiffness, groups) = (one(GUIDE)?, one(STIFFNESS)?, one(GROUP)?);
+        let (guides, groups) = (one(GUIDE)?, one(GROUP)?);
+        let (stiffness, damping) = (one(STIFFNESS)?, one(DAMPING)?);
         let attributes = Attributes {
             widths: self.param(widths, 1, curves, path),
             colors: self.param(colors, given, curves, path),
             uvs: self.param(uvs, 2, curves, path),
             guides,
             stiffness,
+            damping,
             groups,
             group_names: names,
         };
@@ -413,7 +415,7 @@ fn arrays_of<'a>(
 }
 
 /// Attributes that are read …
-const READ: [&str; 8] = [WIDTH, COLOR, ROOT_UV, GUIDE, GROUP, GROUP_NAME, STIFFNESS, "Cd"];
+const READ: [&str; 9] = [WIDTH, COLOR, ROOT_UV, GUIDE, GROUP, GROUP_NAME, STIFFNESS, DAMPING, "Cd"];
 /// … and those about the file.
 const NOTES: [&str; 4] =
     ["groom_version_major", "groom_version_minor", "groom_tool", "groom_properties"];

@@ -173,7 +173,7 @@ impl Values<'_> {
     }
 }
 
-/// Size and meaning of numbers; `None` for text, and halves, which no exporter writes for hair.
+/// Size and meaning of numbers; `None` for text.
 fn numbers(pod: u64) -> Option<(usize, fn(&[u8]) -> f64)> {
     macro_rules! number {
         ($type:ty) => {
@@ -191,6 +191,10 @@ fn numbers(pod: u64) -> Option<(usize, fn(&[u8]) -> f64)> {
         6 => number!(i32),
         7 => number!(u64),
         8 => number!(i64),
+        9 => (2, |bytes| {
+            let bytes = bytes.first_chunk();
+            bytes.map_or(f64::NAN, |bytes| half::f16::from_le_bytes(*bytes).to_f64())
+        }),
         10 => number!(f32),
         11 => number!(f64),
         _ => return None,

@@ -3,7 +3,9 @@
 use super::{
     super::{
         GroomCache, GroomError, GroomFormat, GroomGroup, GroomSettings, GroomStrand, UpAxis,
-        curve_sets::{BYTES_PER_NODE, COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH},
+        curve_sets::{
+            BYTES_PER_NODE, COLOR, DAMPING, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, WIDTH,
+        },
     },
     write::{Archive, Pod, Written, floats},
     *,
@@ -439,6 +441,7 @@ fn whole() -> Groom {
         })
         .and_then(|g| g.with_guides((0..7).map(|i| i % 3 == 0).collect()))
         .and_then(|g| g.with_stiffness((0..7).map(|i| 0.5 + i as f32).collect()))
+        .and_then(|g| g.with_damping((0..7).map(|i| 0.25 * i as f32).collect()))
         .and_then(|g| {
             g.with_groups(vec![group(2, "fringe"), group(-1, "")], vec![0, 0, 1, 0, 1, 1, 0])
         })
@@ -528,6 +531,18 @@ fn groups_have_the_names_and_numbers_of_the_file() {
         |path: &str| GroomGroup { path: path.to_owned(), ..group(0, "") }.head().map(str::to_owned);
     assert_eq!(head("/groom/Head/Hair/Hair"), Some("Head".to_owned()));
     assert_eq!((head("/groom/Hair/Hair"), head("/hair"), head("")), (None, None, None));
+}
+
+#[test]
+fn halves_are_read() {
+    let file = one(4, [1, 0, 0], |archive| {
+        let halves = [0.5, 2.0].map(|share| half::f16::from_f32(share).to_le_bytes()).concat();
+        (Vec::new(), vec![archive.attribute((DAMPING, "uni"), (Pod::F16, 1), &halves)])
+    });
+    let (groom, losses) = read(&file).unwrap();
+    assert!(losses.is_empty(), "{losses}");
+    let shares: Vec<f32> = groom.strands().filter_map(|strand| strand.damping).collect();
+    assert_eq!(shares, [0.5, 2.0]);
 }
 
 #[test]

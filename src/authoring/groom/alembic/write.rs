@@ -2,7 +2,7 @@
 
 use crate::authoring::groom::{
     Groom, GroomCache, GroomError, GroomGroup,
-    curve_sets::{COLOR, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, from_the_top},
+    curve_sets::{COLOR, DAMPING, GROUP, GROUP_NAME, GUIDE, ROOT_UV, STIFFNESS, from_the_top},
 };
 use bevy::prelude::*;
 
@@ -20,6 +20,8 @@ pub(super) enum Pod {
     U8 = 1,
     I16 = 4,
     I32 = 6,
+    #[cfg_attr(not(test), allow(dead_code, reason = "read, but not written"))]
+    F16 = 9,
     F32 = 10,
     F64 = 11,
     Text = 12,
@@ -222,6 +224,7 @@ impl Archive {
             Pod::U8 => "uint8_t",
             Pod::I16 => "int16_t",
             Pod::I32 => "int32_t",
+            Pod::F16 => "float16_t",
             Pod::F32 => "float32_t",
             Pod::F64 => "float64_t",
             Pod::Text => "string",
@@ -316,6 +319,10 @@ fn write_samples(
     if !groom.stiffness.is_empty() {
         let shares = floats(groom.stiffness.iter().copied());
         attributes.push(archive.attribute((STIFFNESS, "uni"), (Pod::F32, 1), &shares));
+    }
+    if !groom.damping.is_empty() {
+        let shares = floats(groom.damping.iter().copied());
+        attributes.push(archive.attribute((DAMPING, "uni"), (Pod::F32, 1), &shares));
     }
     if !groom.groups.is_empty() {
         let unnamed = GroomGroup::default();

@@ -5,7 +5,9 @@ mod groups;
 mod params;
 
 pub use curves::{Curves, Kind, Numbers};
-pub use params::{COLOR, GROUP, GROUP_NAME, GUIDE, Param, ROOT_UV, STIFFNESS, WIDTH, from_the_top};
+pub use params::{
+    COLOR, DAMPING, GROUP, GROUP_NAME, GUIDE, Param, ROOT_UV, STIFFNESS, WIDTH, from_the_top,
+};
 
 use super::{Groom, GroomError, GroomLosses, intake::Intake, losses::GroomPlace};
 use bevy::{
@@ -53,6 +55,7 @@ pub struct Attributes<'n, V> {
     pub uvs: Option<Param<V, 2>>,
     pub guides: Option<Param<V, 1>>,
     pub stiffness: Option<Param<V, 1>>,
+    pub damping: Option<Param<V, 1>>,
     pub groups: Option<Param<V, 1>>,
     /// One for all, or one a curve.
     pub group_names: Vec<&'n str>,
@@ -60,8 +63,8 @@ pub struct Attributes<'n, V> {
 
 impl<V> Default for Attributes<'_, V> {
     fn default() -> Self {
-        let (widths, colors, uvs, guides, stiffness, groups) = default();
-        Self { widths, colors, uvs, guides, stiffness, groups, group_names: Vec::new() }
+        let (widths, colors, uvs, guides, stiffness, damping, groups) = default();
+        Self { widths, colors, uvs, guides, stiffness, damping, groups, group_names: Vec::new() }
     }
 }
 
@@ -75,6 +78,7 @@ pub struct CurveSets {
     uvs: Column<2>,
     guides: Column<1>,
     stiffness: Column<1>,
+    damping: Column<1>,
     groups: Groups,
     pub losses: GroomLosses,
 }
@@ -90,6 +94,7 @@ impl CurveSets {
             uvs: Column::EMPTY,
             guides: Column::EMPTY,
             stiffness: Column::EMPTY,
+            damping: Column::EMPTY,
             groups: Groups::default(),
             losses: GroomLosses::default(),
         }
@@ -200,6 +205,7 @@ impl CurveSets {
         };
         each_curve(&attributes.guides, &mut self.guides);
         each_curve(&attributes.stiffness, &mut self.stiffness);
+        each_curve(&attributes.damping, &mut self.damping);
         let ids = attributes.groups.as_ref();
         let id = |curve| ids.map(|id| id.at(curve, 0)[0] as i32);
         let ids = curves.iter().map(|curve| (id(curve), curve.index));
@@ -216,11 +222,15 @@ impl CurveSets {
     /// # Errors
     /// When no strand is left.
     pub fn finish(self) -> Result<Intake, GroomError> {
-        let Self { mut groom, widths, colors, uvs, guides, stiffness, groups, losses, .. } = self;
+        let Self {
+            mut groom, widths, colors, uvs, guides, stiffness, damping, groups, losses, ..
+        } = self;
         groom.widths = widths.filled(None).into_iter().map(|[width]| width).collect();
         groom.colors = colors.filled(None).into_iter().map(LinearRgba::from_f32_array).collect();
         groom.uvs = uvs.filled(Some([0.0; 2])).into_iter().map(Vec2::from_array).collect();
-        groom.stiffness = stiffness.filled(Some([1.0])).into_iter().map(|[share]| share).collect();
+        let shares =
+            |of: Column<1>| of.filled(Some([1.0])).into_iter().map(|[share]| share).collect();
+        (groom.stiffness, groom.damping) = (shares(stiffness), shares(damping));
         if groups.is_known || groups.sets > 1 {
             (groom.groups, groom.all_groups) = (groups.of_strands.into(), groups.all.into());
         }

@@ -12,6 +12,7 @@ pub const GROUP: &str = "groom_group_id";
 pub const GROUP_NAME: &str = "groom_group_name";
 /// Our own.
 pub const STIFFNESS: &str = "groom_stiffness";
+pub const DAMPING: &str = "groom_damping";
 
 /// The numbers of one property, N to an element.
 pub struct Param<V, const N: usize> {

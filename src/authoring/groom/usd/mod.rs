@@ -19,7 +19,7 @@
 //! | colours | `groom_color`, else `displayColor`, unless it is one for all |
 //! | guides | `groom_guide`: see [`Groom::with_guides`] |
 //! | groups | `groom_group_id` and `groom_group_name`; else each set of several is one: see [`Groom::groups`] |
-//! | stiffness | `groom_stiffness`, our own: see [`Groom::with_stiffness`] |
+//! | stiffness, damping | `groom_stiffness`, `groom_damping`, our own: see [`Groom::with_stiffness`] |
 //!
 //! All but `widths` are primvars. Each may be one for the set, one a curve, one a point or one at each end of a
 //! segment (varying); sets that have none where others do take the mean of those (zero for UVs, 1 for stiffness).

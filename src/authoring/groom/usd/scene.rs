@@ -8,8 +8,8 @@ use super::{
 use crate::authoring::groom::{
     GroomFileError, UpAxis,
     curve_sets::{
-        Attributes, COLOR, CurveSet, CurveSets, Curves, GROUP, GROUP_NAME, GUIDE, Kind, Knots,
-        Numbers, Param, ROOT_UV, STIFFNESS, WIDTH,
+        Attributes, COLOR, CurveSet, CurveSets, Curves, DAMPING, GROUP, GROUP_NAME, GUIDE, Kind,
+        Knots, Numbers, Param, ROOT_UV, STIFFNESS, WIDTH,
     },
     losses::GroomPlace,
 };
@@ -51,7 +51,7 @@ const NO_CURVES: [&str; 14] = [
 ];
 
 /// Primvars that are read …
-const READ: [&str; 12] = [
+const READ: [&str; 13] = [
     WIDTH,
     COLOR,
     ROOT_UV,
@@ -59,6 +59,7 @@ const READ: [&str; 12] = [
     GROUP,
     GROUP_NAME,
     STIFFNESS,
+    DAMPING,
     "widths",
     "displayColor",
     "displayOpacity",
@@ -281,6 +282,7 @@ impl<'a> Scene<'a> {
         let uvs = self.primvar(prim, &[ROOT_UV, "surface_uv_coordinate", "st"])?;
         let guides = self.primvar(prim, &[GUIDE])?;
         let stiffness = self.primvar(prim, &[STIFFNESS])?;
+        let damping = self.primvar(prim, &[DAMPING])?;
         let groups = self.primvar(prim, &[GROUP])?;
         let group_names = self.group_names(prim)?;
         let attributes = Attributes {
@@ -289,6 +291,7 @@ impl<'a> Scene<'a> {
             uvs: self.param(&uvs, 2, &curves, path),
             guides: self.param(&guides, 1, &curves, path),
             stiffness: self.param(&stiffness, 1, &curves, path),
+            damping: self.param(&damping, 1, &curves, path),
             groups: self.param(&groups, 1, &curves, path),
             group_names: group_names.iter().map(String::as_str).collect(),
         };

@@ -353,7 +353,7 @@ fn stage<W: Width<Cell = crate::base::lanes::Lane>>(
         beyond: w.lit(1.0) / theta,
         root_turn: turn.v.scale(two),
         max_twist: w.get(&b.max_twist),
-        damping: (w.lit(params.damping.into()) - own).max(w.lit(0.0)),
+        damping: (w.lit(params.damping.into()) * w.get(&b.damping) - own).max(w.lit(0.0)),
         torsion: Torsion::new(dt, params.torsion),
         second: false,
         again: w.lit(1.0),
