@@ -246,6 +246,14 @@ fn read(log: impl BufRead, pools: TaskPoolOptions) -> Result<Outcome, Box<dyn st
         while let Some(Line::Input { input, .. }) =
             lines.next_if(|line| matches!(line, Line::Input { tick: at, .. } if *at == tick))
         {
+            if let Input::Perm(rate) = &input
+                && !(0.0..=1.0).contains(rate)
+            {
+                return Err(format!(
+                    "the log's input of tick {tick} has a rate of {rate}, expected 0 to 1"
+                )
+                .into());
+            }
             run.act(input);
             outcome.inputs += 1;
         }
@@ -257,7 +265,10 @@ fn read(log: impl BufRead, pools: TaskPoolOptions) -> Result<Outcome, Box<dyn st
         let Some(Line::State { hash, tips, .. }) =
             lines.next_if(|line| matches!(line, Line::State { tick: at, .. } if *at == tick))
         else {
-            return Err(format!("the log has no state of tick {tick}: it was cut off").into());
+            return Err(format!(
+                "the log has no state of tick {tick} where it should be: it was cut off, or edited"
+            )
+            .into());
         };
         let off = places.iter().zip(&tips).map(|(a, b)| a.distance(*b));
         outcome.tips_off.push(off.fold(0.0, f32::max));
@@ -266,7 +277,10 @@ fn read(log: impl BufRead, pools: TaskPoolOptions) -> Result<Outcome, Box<dyn st
             outcome.differs_after_seconds.get_or_insert((tick + 1) / HERTZ as u64);
         }
     }
-    Ok(outcome)
+    match lines.count() {
+        0 => Ok(outcome),
+        more => Err(format!("the log has {more} lines after its last tick: it was edited").into()),
+    }
 }
 
 fn is_second(tick: u64) -> bool {

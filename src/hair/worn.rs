@@ -159,10 +159,15 @@ fn pass_now<T: Passed>(world: &mut World, from: Entity, to: Entity) {
 }
 
 fn acts_from_wearer<T: Passed>(app: &mut App) {
+    passed::<T>(app);
+    app.add_systems(HairChecks, report_stray::<T>);
+}
+
+/// Registers a component that is passed on to hair, and may be on anything.
+pub(crate) fn passed<T: Passed>(app: &mut App) {
     app.world_mut().get_resource_or_init::<PassedTypes>().0.push(pass_now::<T>);
     app.register_type::<CopyOf<T>>()
-        .add_systems(HairFrame, pass_on::<T, WornHair>.in_set(PassedOn))
-        .add_systems(HairChecks, report_stray::<T>);
+        .add_systems(HairFrame, pass_on::<T, WornHair>.in_set(PassedOn));
 }
 
 /// What neither is hair nor wears any, nor is to.

@@ -110,6 +110,67 @@ fn what_is_wrong_in_a_file_is_said_with_its_place() {
     );
 }
 
+#[derive(Reflect, Clone, Debug, PartialEq)]
+struct Inner {
+    x: f32,
+    y: f32,
+}
+
+/// Of a game's own.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default)]
+struct Own {
+    inners: Vec<Inner>,
+}
+
+/// What cannot be copied by reflection.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default)]
+struct Cape {
+    stiff: f32,
+    #[reflect(ignore)]
+    cache: u32,
+}
+
+#[test]
+fn components_that_no_file_can_hold_are_refused() {
+    let mut app = wear::app();
+    app.register_type::<Own>().register_type::<Cape>();
+    for (text, says) in [
+        ("(components: {\"Own\": (inners: [(x: 1)])})", "fields are missing"),
+        ("(components: {\"Cape\": (stiff: 2)})", "clone"),
+        ("(components: {\"ChildOf\": (4294967000)})", "names entities"),
+        ("(components: {\"StrandOf\": (1)})", "names entities"),
+        ("(components: {\"WornBy\": (1)})", "names entities"),
+    ] {
+        let error = recipe(&app, text).unwrap_err().to_string();
+        println!("{text}: {error}");
+        assert!(error.contains(says), "{text}: {error}");
+    }
+    let whole = recipe(&app, "(components: {\"Own\": (inners: [(x: 1, y: 2)])})").unwrap();
+    let handle = app.world_mut().resource_mut::<Assets<HairRecipe>>().add(whole);
+    let own = app.world_mut().spawn(FollowRecipe(handle)).id();
+    app.update();
+    assert_eq!(of::<Own>(&app, own).inners, [Inner { x: 1.0, y: 2.0 }]);
+}
+
+#[test]
+fn what_was_before_is_forgotten_with_the_recipe() {
+    let mut app = wear::app();
+    let (hair, _) = one_strand(&mut app, 0.2, 8, Vec3::X);
+    app.world_mut().entity_mut(hair).insert(AirDrag { rate: 1.0 });
+    let seven = add(&mut app, "(components: {\"AirDrag\": (rate: 7)})");
+    app.world_mut().entity_mut(hair).insert(FollowRecipe(seven));
+    app.update();
+    assert_eq!(of::<AirDrag>(&app, hair).rate, 7.0);
+    app.world_mut().entity_mut(hair).remove::<FollowRecipe>().insert(AirDrag { rate: 33.0 });
+    app.update();
+    let other = add(&mut app, "(components: {\"HairLod\": ()})");
+    app.world_mut().entity_mut(hair).insert(FollowRecipe(other));
+    app.update();
+    assert_eq!(of::<AirDrag>(&app, hair).rate, 33.0);
+}
+
 #[test]
 fn worn_hair_follows_its_recipe_and_grows_again_only_where_it_grows_otherwise() {
     let mut app = wear::app();
@@ -219,12 +280,22 @@ fn settings_of_a_file_are_put_on_any_hair_and_taken_off_again() {
 #[test]
 fn settings_on_a_wearer_are_those_of_all_its_hair() {
     let mut app = wear::app();
-    let handle = add(&mut app, "(components: {\"AirDrag\": (rate: 7)})");
+    let text = "(components: {\"AirDrag\": (rate: 7), \"HairStiffness\": (damping: 0.02)})";
+    let handle = add(&mut app, text);
     let wear = WearHair::new(HairPreset::Short);
     let root = app.world_mut().spawn((Transform::default(), wear, FollowRecipe(handle))).id();
     character(&mut app, root, 1.0);
     let hair = worn(&mut app);
+    (0..3).for_each(|_| app.update());
     assert_eq!(of::<AirDrag>(&app, hair).rate, 7.0);
+    let of_preset = HairPreset::Short.settings().stiffness;
+    let expected = HairStiffness { damping: 0.02, ..of_preset };
+    assert_eq!(of::<HairStiffness>(&app, hair), expected, "the others are the preset's");
+    assert!(app.world().get::<AirDrag>(root).is_none());
+    app.world_mut().entity_mut(root).remove::<FollowRecipe>();
+    (0..3).for_each(|_| app.update());
+    assert!(app.world().get::<FollowRecipe>(hair).is_none());
+    assert_eq!(of::<AirDrag>(&app, hair).rate, 7.0, "what it has stays");
 }
 
 #[test]
@@ -248,6 +319,18 @@ fn recipes_that_cannot_be_used_are_reported_once() {
         matches!(&refused[..], [(_, WearError::NotLoaded { what: "recipe", .. })]),
         "{refused:?}"
     );
+    // More strands than memory holds.
+    let many = "(planting: (density: 500), components: {\"HairFollowers\": (count: 4294967295)})";
+    let handle = add(&mut app, many);
+    app.world_mut().entity_mut(root).insert(WearHair::of_recipe(handle));
+    let refused = wait(&mut app).refused;
+    assert!(refused[0].1.to_string().contains("HairFollowers::count"), "{refused:?}");
+    // Two that would grow from the same roots.
+    let handle = add(&mut app, "(preset: Short, planting: (length: 0.1))");
+    let both = WearHair::of_recipe(handle).and(HairPreset::Short);
+    app.world_mut().entity_mut(root).insert(both);
+    let refused = wait(&mut app).refused;
+    assert!(matches!(&refused[..], [(_, WearError::Twice { .. })]), "{refused:?}");
     // A value that no hair grows by.
     let handle = add(&mut app, "(planting: (density: -4))");
     app.world_mut().entity_mut(root).insert(WearHair::of_recipe(handle));

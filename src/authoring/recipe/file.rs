@@ -10,7 +10,9 @@ use bevy::{
     asset::{AssetLoader, LoadContext, io::Reader},
     ecs::reflect::{AppTypeRegistry, ReflectComponent},
     prelude::*,
-    reflect::{TypeRegistration, TypeRegistry, TypeRegistryArc, Typed},
+    reflect::{
+        TypeInfo, TypeRegistration, TypeRegistry, TypeRegistryArc, Typed, enums::VariantInfo,
+    },
 };
 use core::{any::TypeId, fmt};
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
@@ -153,7 +155,12 @@ impl<'de> Visitor<'de> for ComponentsOf<'_> {
             }
             let value = all.next_value_seed(Partial { of: registration, registry })?;
             let value = match registration.data::<ReflectDefault>() {
-                Some(default) => fitting(default.default().as_partial_reflect_mut(), value)?,
+                Some(default) => {
+                    let mut default = default.default();
+                    // What it was before is kept.
+                    default.reflect_clone().map_err(A::Error::custom)?;
+                    fitting(default.as_partial_reflect_mut(), value)?
+                }
                 None => whole(registration, value).map_err(A::Error::custom)?,
             };
             found.push((id, value));
@@ -169,6 +176,9 @@ fn component_named<'a>(
 ) -> Result<&'a TypeRegistration, String> {
     let by_name = registry.get_with_short_type_path(name);
     let found = by_name.or_else(|| registry.get_with_type_path(name));
+    if found.is_some_and(|found| names_entities(found.type_info(), registry, 0)) {
+        return Err(format!("{name:?} names entities, which a file does not know"));
+    }
     let is_component = |found: &&TypeRegistration| found.contains::<ReflectComponent>();
     if let Some(found) = found.filter(is_component) {
         return Ok(found);
@@ -184,6 +194,28 @@ fn component_named<'a>(
     let own = own.filter(|of| of.crate_name() == Some("bevy_keratin")).map(|of| of.short_path());
     let near = own.min_by_key(|other| distance(name, other)).unwrap_or_default();
     Err(format!("no component is named {name:?}; the nearest name is {near:?}"))
+}
+
+/// Whether there is an entity among the fields of a type, however deep.
+fn names_entities(info: &TypeInfo, registry: &TypeRegistry, depth: usize) -> bool {
+    let inside = |id: TypeId| {
+        let is_entity = id == TypeId::of::<Entity>();
+        let deeper = || registry.get(id).filter(|_| depth < 8);
+        is_entity || deeper().is_some_and(|of| names_entities(of.type_info(), registry, depth + 1))
+    };
+    match info {
+        TypeInfo::Struct(info) => info.iter().any(|field| inside(field.type_id())),
+        TypeInfo::TupleStruct(info) => info.iter().any(|field| inside(field.type_id())),
+        TypeInfo::Tuple(info) => info.iter().any(|field| inside(field.type_id())),
+        TypeInfo::List(info) => inside(info.item_ty().id()),
+        TypeInfo::Array(info) => inside(info.item_ty().id()),
+        TypeInfo::Enum(info) => info.iter().any(|variant| match variant {
+            VariantInfo::Struct(variant) => variant.iter().any(|field| inside(field.type_id())),
+            VariantInfo::Tuple(variant) => variant.iter().any(|field| inside(field.type_id())),
+            VariantInfo::Unit(_) => false,
+        }),
+        _ => false,
+    }
 }
 
 /// How many letters have to be put in, left out or changed.

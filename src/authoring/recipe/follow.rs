@@ -1,7 +1,10 @@
 //! Components that follow a recipe.
 
 use super::what::HairRecipe;
-use crate::base::fault::{FaultKind, HairFault};
+use crate::{
+    base::fault::{FaultKind, HairFault},
+    hair::worn::Wearer,
+};
 use bevy::{
     asset::LoadState, ecs::reflect::AppTypeRegistry, platform::collections::HashSet, prelude::*,
 };
@@ -9,7 +12,8 @@ use core::any::TypeId;
 use std::sync::Arc;
 
 /// Puts the components of a [`HairRecipe`] on its entity, once it is loaded and whenever it changes: settings and looks of
-/// hair from a groom, or of a wearer for all of its hair. Component of any entity; hair that is worn by a recipe has it.
+/// hair from a groom. Component of any entity; hair that is worn by a recipe has it. On a wearer it acts on each hair that it
+/// wears, in place of the hair's own.
 ///
 /// A field that the file does not name stays as it was, one that a later version names no more becomes again what it was
 /// before; what a game has written to them meanwhile is overwritten when the file changes. Without this component all stays as
@@ -47,7 +51,8 @@ type Before = Arc<Vec<(TypeId, Option<Box<dyn Reflect>>)>>;
 
 pub(super) fn follow(
     mut commands: Commands,
-    entities: Query<(Entity, &FollowRecipe, Option<&Followed>)>,
+    // A wearer's acts on its hair.
+    entities: Query<(Entity, &FollowRecipe, Option<&Followed>), Without<Wearer>>,
     (recipes, assets): (Res<Assets<HairRecipe>>, Res<AssetServer>),
     mut reported: Local<HashSet<AssetId<HairRecipe>>>,
     mut faults: MessageWriter<HairFault>,
@@ -68,6 +73,11 @@ pub(super) fn follow(
             faults.write(HairFault::new(FaultKind::Setting, message).of(entity));
         }
     }
+}
+
+/// What it has stays; another recipe begins anew.
+pub(super) fn forget(gone: On<Remove, FollowRecipe>, mut commands: Commands) {
+    commands.entity(gone.entity).try_remove::<Followed>();
 }
 
 /// Puts a recipe's components on an entity, in place of those of one before.

@@ -32,20 +32,20 @@ pub use follow::FollowRecipe;
 pub(crate) use follow::{Followed, apply};
 pub use what::HairRecipe;
 
-use crate::base::schedule::HairFrame;
+use crate::{
+    base::schedule::HairFrame,
+    hair::worn::{self, PassedOn},
+};
 use bevy::prelude::*;
 
 /// Loads a [`HairRecipe`], and puts its components on entities with [`FollowRecipe`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RecipePlugin;
 
-/// Of the system that follows recipes, in [`HairFrame`].
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct RecipesFollowed;
-
 impl Plugin for RecipePlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<FollowRecipe>();
+        worn::passed::<FollowRecipe>(app);
+        app.register_type::<FollowRecipe>().add_observer(follow::forget);
         add_loader(app);
     }
 
@@ -61,6 +61,6 @@ fn add_loader(app: &mut App) {
     if world.contains_resource::<AssetServer>() && !is_there {
         app.init_asset::<HairRecipe>()
             .init_asset_loader::<RecipeLoader>()
-            .add_systems(HairFrame, follow::follow.in_set(RecipesFollowed));
+            .add_systems(HairFrame, follow::follow.after(PassedOn));
     }
 }

@@ -40,6 +40,14 @@ pub(super) fn patch(
             Ok(())
         }
         (ReflectMut::List(to), ReflectRef::List(from)) => {
+            // What could not be made of a file's fields is no value of any type.
+            if let Some(value) = from.iter().find(|value| value.try_as_reflect().is_none()) {
+                let name = |of: &dyn PartialReflect| of.reflect_type_path().to_owned();
+                return Err(ApplyError::MismatchedTypes {
+                    from_type: format!("{}, of which fields are missing,", name(value)).into(),
+                    to_type: "an element of the list".into(),
+                });
+            }
             to.drain();
             from.iter().for_each(|value| to.push(value.to_dynamic()));
             Ok(())

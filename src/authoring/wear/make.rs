@@ -30,8 +30,7 @@ use crate::{
         },
         groom::{Groom, GroomGuides, GrownStrands},
         plant::{
-            HUMAN_DENSITY, Planting, PresetSettings, RootOnMesh, RootPlace, SurfacePoint,
-            surface_points,
+            HUMAN_DENSITY, PresetSettings, RootOnMesh, RootPlace, SurfacePoint, surface_points,
         },
         recipe::HairRecipe,
     },
@@ -305,6 +304,14 @@ pub(super) fn make(
     wanted: &(dyn Fn() -> bool + Sync),
 ) -> Result<Made, WearError> {
     order.wear.check_beside()?;
+    let mut presets = HashSet::new();
+    for input in &order.hairs {
+        if let Source::Recipe(recipe) = &input.source
+            && !presets.insert(recipe.preset())
+        {
+            return Err(WearError::Twice { hair: format!("the preset {:?}", recipe.preset()) });
+        }
+    }
     let fitting = fit(&mut order.target.parts, &order.wear)?;
     let each: Vec<WearHair> = order.wear.each().collect();
     let grown = each.iter().zip(&order.hairs).map(|(wear, input)| grow(wear, input, &fitting));
@@ -524,7 +531,11 @@ fn plant(
     let length = WornPreset::LENGTH.named("WearHair::length").check(wear.length)?;
     let preset = recipe.preset();
     let worn = WornPreset { seed: wear.seed, length, ..WornPreset::of(preset) };
-    let mut planting = Planting { seed: wear.seed, ..recipe.planting(&fitting.scalp) };
+    let mut planting = recipe.planting(&fitting.scalp);
+    // A file may have a seed as well.
+    if wear.seed != 0 {
+        planting.seed = wear.seed;
+    }
     let own_length = planting.length;
     if worn.length != 1.0 {
         planting = planting.lengthened(worn.length);
@@ -557,7 +568,7 @@ fn plant(
             scalp: fitting.scalp,
             hairline: (wear.hairline.map(Ranged::checked).transpose()?)
                 .map_or_else(|| recipe.hairline().checked(), Ok)?,
-            count: if is_drawn { settings.followers.count } else { 0 },
+            count: if is_drawn { settings.followers.checked()?.count } else { 0 },
             seed: wear.seed,
         }
         .plant(&planted, &mesh, &of_head)?,

@@ -1,6 +1,8 @@
 //! Which instruction sets kernels are compiled for, and which one they run on.
 
-use fearless_simd::{Level, Simd};
+use fearless_simd::Level;
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::Simd;
 use std::{env, ffi::OsStr, sync::OnceLock};
 
 /// Runs `work` with the token of the machine's instruction set bound to `simd`, compiled for that set.
@@ -32,6 +34,7 @@ macro_rules! dispatch {
 
 /// Runs `work` compiled for the instruction set of a token, in a function of its own where the caller is
 /// compiled for less.
+#[cfg(target_arch = "x86_64")]
 macro_rules! with_token {
     ($token:expr, $simd:pat => $work:expr) => {{
         let token = $token;
@@ -44,7 +47,9 @@ macro_rules! with_token {
     }};
 }
 
-pub(crate) use {dispatch, with_token};
+pub(crate) use dispatch;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use with_token;
 
 /// Hands a closure through that is `#[inline(always)]`, which a `let` alone does not take.
 ///

@@ -13,7 +13,9 @@ pub use algebra::{Quaternion, V3};
 pub(crate) use algebra::{splat, splat3};
 #[cfg(test)]
 pub(crate) use dispatch::simd_levels;
-pub(crate) use dispatch::{dispatch, inlined, simd_level, with_token};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use dispatch::with_token;
+pub(crate) use dispatch::{dispatch, inlined, simd_level};
 pub use memory::{Lane, put3, put4, take3, take4};
 pub(crate) use memory::{load, load3, load4, store3, store4};
 pub(crate) use real::lanes_in;

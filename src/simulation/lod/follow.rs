@@ -234,7 +234,10 @@ impl GuideOffsets {
             if let Some(own) = self.own.get(i) {
                 turn = Quat::from_scaled_axis(*own * own_motion) * turn;
             }
-            p += turn * offsets[0].segment;
+            if !turn.is_finite() {
+                turn = Quat::IDENTITY;
+            }
+            p += finite(turn * offsets[0].segment);
             let before = core::mem::replace(position, p);
             if let Some(kept) = pose.before.get_mut(i + 1) {
                 *kept = before;

@@ -15,9 +15,13 @@ use crate::{
         setting::{self, HairDefault, Ranged, Settings},
     },
     hair::{
-        strand::{Hair, MotionOwner, Regroomed, Strand, Strands, keep_required, lacks_strands},
+        strand::{
+            Hair, KinematicStrand, MotionOwner, Regroomed, Strand, StrandOf, Strands,
+            keep_required, lacks_strands,
+        },
         worn,
     },
+    keratin::bond::{BondInfluence, Bonds},
     water::IsWet,
 };
 use bevy::prelude::*;
@@ -55,7 +59,7 @@ impl Plugin for LodPlugin {
             .add_systems(
                 HairTick,
                 (
-                    (choose, note_overwritten, choose_guides)
+                    (rebuild_broken, choose, note_overwritten, choose_guides)
                         .chain()
                         .in_set(HairSystems::LevelOfDetail)
                         .run_if(first_substep),
@@ -71,6 +75,30 @@ impl Plugin for LodPlugin {
 struct Reported {
     exceeded: bool,
     left_out: bool,
+}
+
+type Rebuilt =
+    (Entity, &'static StrandOf, &'static mut Strand, Option<&'static Bonds>, Has<KinematicStrand>);
+
+/// A strand that is written into until it is not finite is put back by its next step. Those of which there is none get the
+/// pose that their bonds remember.
+fn rebuild_broken(
+    influence: Settings<BondInfluence>,
+    hairs: Query<&MotionOwner, With<Hair>>,
+    mut strands: Query<Rebuilt, Changed<Strand>>,
+    mut faults: MessageWriter<HairFault>,
+) {
+    for (entity, of, mut strand, bonds, is_kinematic) in &mut strands {
+        let is_frozen = || hairs.get(of.0).is_ok_and(|owner| *owner == MotionOwner::Frozen);
+        if strand.is_finite() || !(is_kinematic || is_frozen()) {
+            continue;
+        }
+        let influence = influence.of(of.0).as_array();
+        let joints = bonds.map_or(&[][..], |bonds| &bonds.joints);
+        let shape = joints.iter().map(|joint| joint.relaxed(&influence));
+        let fault = strand.bypass_change_detection().put_back(shape);
+        faults.write_batch(fault.map(|fault| fault.of(entity)));
+    }
 }
 
 /// Hair without levels is simulated in full.

@@ -8,8 +8,8 @@ mod operations;
 use crate::common::*;
 use bevy::{prelude::*, reflect::ReflectMut};
 use bevy_keratin::{
-    BondChanges, DropletRules, FaultKind, HairSubsteps, InvalidValue, Shower, SoakHair,
-    hair::strand::TickPose, keratin::bond::RestShape, prelude::*,
+    BondChanges, DropletRules, FaultKind, HairLod, HairSubsteps, InvalidValue, LodLevel,
+    MotionOwner, Shower, SoakHair, hair::strand::TickPose, keratin::bond::RestShape, prelude::*,
 };
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
@@ -121,6 +121,24 @@ fn a_strand_whose_parts_do_not_fit_is_cut_once_it_is_repaired() {
         run(&mut app, 0.1);
         assert!((strand(&app, id).length() - 0.1).abs() < 1e-3, "{part}");
     }
+}
+
+/// Nothing simulates hair that is small on the screen, and so nothing else would notice.
+#[test]
+fn a_frozen_strand_that_is_written_into_is_rebuilt() {
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let small = LodLevel { below: 10.0, strands: 0.0, ..default() };
+    app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![small], ..default() });
+    run(&mut app, 0.1);
+    assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
+    for wrong in [f32::NAN, f32::NEG_INFINITY] {
+        app.world_mut().get_mut::<Strand>(id).unwrap().positions_mut()[5].y = wrong;
+        run(&mut app, 0.1);
+        assert!(strand(&app, id).is_finite() && strand(&app, id).peak_strain() < 0.01, "{wrong}");
+    }
+    let reported = faults(&mut app);
+    assert!(matches!(&reported[..], [f] if f.kind == FaultKind::Rebuilt), "{reported:?}");
 }
 
 /// Pops the last item of a list in a component's private part.

@@ -13,7 +13,7 @@ use bevy::{
 };
 use bevy_keratin::{
     AddedMass, BondChanges, ContactMethod, HairLod, HairSnapshot, HairSnapshots, HairSubsteps,
-    Shower, SleepSettings, SoakHair, SolverMethod, WindReceived, WindZone,
+    MotionOwner, Shower, SleepSettings, SoakHair, SolverMethod, WindReceived, WindZone,
     authoring::attach::TiedRoots,
     forces::{
         contact::{LockNeighbours, Obstacles},
@@ -131,6 +131,14 @@ fn search(value: &dyn PartialReflect) -> Option<String> {
 const STATE: [&str; 7] =
     ["Strand", "StrandHistory", "Moisture", "Droplet", "Bonds", "TickPose", "RestShape"];
 
+/// The components of an entity.
+fn names(world: &World, entity: Entity) -> Vec<String> {
+    let registry = world.resource::<AppTypeRegistry>().read();
+    let parts = world.inspect_entity(entity).into_iter().flatten();
+    let types = parts.filter_map(|part| registry.get(part.type_id()?));
+    types.map(|of| of.type_info().type_path_table().short_path().to_owned()).collect()
+}
+
 /// A number of the world's state that is not finite, if there is one.
 pub fn not_finite(app: &mut App) -> Option<String> {
     let world = app.world_mut();
@@ -154,7 +162,14 @@ pub fn not_finite(app: &mut App) -> Option<String> {
                 && let Some(value) = component.reflect(world.entity(*entity))
                 && let Some(found) = search(value.as_partial_reflect())
             {
-                return Some(format!("{entity}: {name}{found}: {value:?}"));
+                let of = world.get::<StrandOf>(*entity).map(|of| of.0);
+                return Some(format!(
+                    "{entity}: {name}{found}: {value:?}; it has {:?} and {:?}, its hair {:?} and {:?}",
+                    names(world, *entity),
+                    world.get::<StrandSleep>(*entity),
+                    of.map(|hair| names(world, hair)),
+                    of.map(|hair| world.get::<MotionOwner>(hair))
+                ));
             }
         }
     }
@@ -245,12 +260,10 @@ pub fn find_dead(app: &mut App) -> Option<String> {
     for (entity, way) in whole.into_iter().zip(farthest) {
         let strand = app.world().get::<Strand>(entity).unwrap();
         if !strand.is_finite() || way < 1e-4 {
-            let names: Vec<String> = (app.world().inspect_entity(entity).unwrap())
-                .map(|part| part.name().shortname().to_string())
-                .collect();
             return Some(format!(
-                "{entity} of {} nodes moves by {way} m: {names:?}, {:?}",
+                "{entity} of {} nodes moves by {way} m: {:?}, {:?}",
                 strand.nodes(),
+                names(app.world(), entity),
                 app.world().get::<StrandSleep>(entity)
             ));
         }

@@ -241,3 +241,42 @@ fn what_cannot_be_a_cache_says_so() {
     assert!(strands.iter().all(|id| strand(&app, *id).is_finite()));
     assert_eq!(app.world().get::<PlayGroomCache>(id).unwrap().time, 0.0);
 }
+
+/// Guides of a groom are as many as its strands, but in an order of their own.
+#[test]
+fn each_strand_of_a_groom_plays_its_own() {
+    let mut app = app();
+    let line = |i: usize, lean: f32| -> Vec<Vec3> {
+        let root = Vec3::X * 0.01 * i as f32;
+        (0..16).map(|k| root + (Vec3::Y + Vec3::Z * lean * i as f32) * (0.01 * k as f32)).collect()
+    };
+    let groom = Groom::from_polylines((0..8).map(|i| line(i, 0.0))).unwrap();
+    let leans = (0..8).flat_map(|i| line(i, 0.05)).collect();
+    let cache =
+        GroomCache::new(groom.clone(), [(0.0, groom.points().to_vec()), (1.0, leans)]).unwrap();
+    let hair = app.world_mut().spawn(Hair).id();
+    let guides = GroomGuides { count: 8, nodes: 16, ..default() };
+    let strands = groom.spawn(&mut app.world_mut().commands(), hair, &guides).unwrap();
+    app.world_mut().flush();
+    let roots = |app: &App| -> Vec<Vec3> {
+        strands.iter().map(|id| strand(app, *id).positions()[0]).collect()
+    };
+    let before = roots(&app);
+    assert!(!before.is_sorted_by_key(|root| root.x), "in another order: {before:?}");
+    let cache = app.world_mut().resource_mut::<Assets<GroomCache>>().add(cache);
+    let play = PlayGroomCache { time: 1.0, speed: 0.0, ..PlayGroomCache::new(cache) };
+    app.world_mut().entity_mut(hair).insert(play);
+    run(&mut app, 0.1);
+    assert!(worst(&roots(&app), &before) < 1e-5, "each stays at its root");
+    for id in &strands {
+        let own = strand(&app, *id).positions();
+        let i = (own[0].x / 0.01).round() as usize;
+        assert!(own[15].distance(line(i, 0.05)[15]) < 1e-4, "strand {i}");
+    }
+    // A cache that is not there yet: it is simulated.
+    let nowhere = app.world_mut().resource_mut::<Assets<GroomCache>>().reserve_handle();
+    app.world_mut().get_mut::<PlayGroomCache>(hair).unwrap().cache = nowhere;
+    run(&mut app, 0.1);
+    assert_ne!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Played));
+    assert_eq!(faults(&mut app), []);
+}

@@ -149,6 +149,11 @@ fn begin(
             faults.write(HairFault::new(FaultKind::Setting, message).of(hair));
         }
         let Some(cache) = caches.get(id) else {
+            // Not there yet, or no more.
+            if !playback.strands.is_empty() {
+                playback.strands.clear();
+                commands.entity(hair).try_remove::<PlayedHair>();
+            }
             let is_known = playback.failed == Some(id);
             if let (LoadState::Failed(error), false) = (assets.load_state(id), is_known) {
                 let error = error.to_string();
@@ -181,9 +186,10 @@ fn begin(
             own.into_iter().map(|(entity, (strand, _))| (entity, strand)).collect();
         playback.strands = matched(cache, &own, &known);
         (playback.cache, playback.failed) = (id, None);
-        if !playback.strands.is_empty() {
-            commands.entity(hair).try_insert(PlayedHair).try_remove::<Settling>();
-        }
+        match playback.strands.is_empty() {
+            false => commands.entity(hair).try_insert(PlayedHair).try_remove::<Settling>(),
+            true => commands.entity(hair).try_remove::<PlayedHair>(),
+        };
     }
 }
 
@@ -196,12 +202,20 @@ fn matched(
     let strands = || cache.groom().strands();
     let is_same = own.len() == strands().len()
         && own.iter().zip(strands()).all(|((_, own), of)| own.nodes() == of.points.len());
+    let root = |i: usize| Some(cache.frame(0)[nodes_of(cache, i)?.start]);
+    let roots = KdTree::new((0..strands().len()).filter_map(root).zip(0..));
     if is_same {
-        return own.iter().map(|(entity, _)| *entity).zip(0..).collect();
+        // Guides of a groom are as many, but in an order of their own. Roots on a skin may have moved all together.
+        let squares = own.iter().enumerate().filter_map(|(i, (_, strand))| {
+            let at = *strand.positions().first()?;
+            let nearest = roots.nearest::<1>(at).next()?.1;
+            Some((root(i)?.distance_squared(at), nearest))
+        });
+        let (own_order, nearest) = squares.fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+        if own_order <= 4.0 * nearest + 1e-6 * own.len() as f32 {
+            return own.iter().map(|(entity, _)| *entity).zip(0..).collect();
+        }
     }
-    let roots =
-        (0..strands().len()).filter_map(|i| Some(cache.frame(0)[nodes_of(cache, i)?.start]));
-    let roots = KdTree::new(roots.zip(0..));
     let nearest = |(entity, strand): &(Entity, &Strand)| {
         if let Some(of) = known.get(entity) {
             return Some((*entity, *of));
