@@ -69,11 +69,10 @@ pub fn followers_are_drawn_where_they_are_given_and_no_more_than_asked_for() {
 pub fn hair_that_is_played_is_drawn_as_it_was_when_it_was_recorded() {
     let spawn = |scene: &mut Offscreen, is_kept: bool| {
         scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
-        let light = DirectionalLight { illuminance: 6000.0, ..default() };
         let world = scene.app.world_mut();
-        world.spawn((light, Transform::from_xyz(1.0, 1.5, 1.0).looking_at(Vec3::ZERO, Vec3::Y)));
-        let followers = HairFollowers::new(300);
-        let hair = world.spawn((Hair, HairLook::default(), followers)).id();
+        let look = HairLook { width: 2e-3, taper: 1.0, ..default() };
+        let hair =
+            world.spawn((Hair, look, HairFollowers::new(60), HairView::Moisture)).id();
         if is_kept {
             world.entity_mut(hair).insert(RecordGroomCache::default());
         }

@@ -42,10 +42,10 @@ pub(super) fn patch(
         (ReflectMut::List(to), ReflectRef::List(from)) => {
             // What could not be made of a file's fields is no value of any type.
             if let Some(value) = from.iter().find(|value| value.try_as_reflect().is_none()) {
-                let name = |of: &dyn PartialReflect| of.reflect_type_path().to_owned();
+                let of = value.get_represented_type_info().map_or("value", |info| info.type_path());
                 return Err(ApplyError::MismatchedTypes {
-                    from_type: format!("{}, of which fields are missing,", name(value)).into(),
-                    to_type: "an element of the list".into(),
+                    from_type: format!("{of} of which fields are missing").into(),
+                    to_type: format!("{of} without a default").into(),
                 });
             }
             to.drain();
