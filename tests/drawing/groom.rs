@@ -71,8 +71,7 @@ pub fn hair_that_is_played_is_drawn_as_it_was_when_it_was_recorded() {
         scene.look(Vec3::new(0.0, 0.0, 0.5), Vec3::ZERO);
         let world = scene.app.world_mut();
         let look = HairLook { width: 2e-3, taper: 1.0, ..default() };
-        let hair =
-            world.spawn((Hair, look, HairFollowers::new(60), HairView::Moisture)).id();
+        let hair = world.spawn((Hair, look, HairFollowers::new(60), HairView::Moisture)).id();
         if is_kept {
             world.entity_mut(hair).insert(RecordGroomCache::default());
         }
@@ -106,7 +105,9 @@ pub fn hair_that_is_played_is_drawn_as_it_was_when_it_was_recorded() {
     let mut scene = Offscreen::new(240, 180);
     let hair = spawn(&mut scene, false);
     let cache = scene.app.world_mut().resource_mut::<Assets<GroomCache>>().add(cache);
-    let play = PlayGroomCache { time: end, speed: 0.0, ..PlayGroomCache::new(cache) };
+    // What stands still is drawn where it is, what moves between its last two ticks: at the earlier, just after the later.
+    let time = end - scene.app.world().resource::<Time<Fixed>>().timestep().as_secs_f32();
+    let play = PlayGroomCache { time, speed: 0.0, ..PlayGroomCache::new(cache) };
     scene.app.world_mut().entity_mut(hair).insert(play);
     tick(&mut scene, 3);
     let played = scene.draw();
