@@ -32,7 +32,7 @@ use bevy::{
     time::TimeUpdateStrategy,
 };
 use bevy_keratin::{SolverMethod, prelude::*};
-use clap::Parser;
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, parser::ValueSource};
 use indicatif::{ProgressBar, ProgressStyle};
 use report::Report;
 use scenes::{Director, Scene, SceneKind, ScenePlugin, Strewn, UnknownName, measure};
@@ -134,13 +134,43 @@ fn solver(name: &str) -> Result<SolverMethod, String> {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
+    let given = Arguments::command().get_matches();
+    let arguments = Arguments::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
+    match useful(&given, arguments.scene).and_then(|()| run(&arguments)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::FAILURE
         }
     }
+}
+
+/// Whether the scene has a use for all that was given.
+fn useful(given: &ArgMatches, scene: Show) -> Result<(), Box<dyn std::error::Error>> {
+    let takes: &[&str] = match scene {
+        Show::Scene(_) => {
+            &["variant", "seconds", "droplets", "csv", "threads", "solver", "gpu", "no_contact"]
+        }
+        Show::Swing => &["length", "bending_length", "segments", "from", "substeps"],
+        Show::Worlds => &[],
+        Show::Rods => &["plots"],
+        Show::Characters => &["files"],
+        Show::Replay => &["seconds", "threads", "seed", "write", "read"],
+    };
+    let command = Arguments::command();
+    let is_useless = |id: &str| {
+        let is_given = given.value_source(id) == Some(ValueSource::CommandLine);
+        is_given && !["scene", "json"].contains(&id) && !takes.contains(&id)
+    };
+    let useless = command.get_arguments().find(|argument| is_useless(argument.get_id().as_str()));
+    let Some(useless) = useless else { return Ok(()) };
+    let name = |of: &str| match of {
+        "files" => "FILE.glb".to_owned(),
+        _ => format!("--{}", of.replace('_', "-")),
+    };
+    let takes: Vec<String> = takes.iter().chain(&["json"]).map(|id| name(id)).collect();
+    let (useless, takes) = (name(useless.get_id().as_str()), takes.join(", "));
+    Err(format!("{useless} is not for this scene, which takes {takes}").into())
 }
 
 /// Prints how hair sits on characters.
@@ -184,15 +214,9 @@ fn table(rows: Vec<rows::Row>, json: bool) -> Result<(), Box<dyn std::error::Err
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    if !arguments.files.is_empty() && arguments.scene != Show::Characters {
-        return Err("FILE.glb is for --scene characters".into());
-    }
-    if arguments.replay.any() && arguments.scene != Show::Replay {
-        return Err("--write and --read are for --scene replay".into());
-    }
     let kind = match arguments.scene {
         Show::Scene(kind) => kind,
-        Show::Swing => return swing(arguments),
+        Show::Swing => return print(&arguments.swing.run()?, arguments.json),
         Show::Worlds => return table(worlds::rows(), arguments.json),
         Show::Rods => return rods(arguments),
         Show::Characters => return characters(arguments),
@@ -201,11 +225,6 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
             return arguments.replay.run(arguments.seconds, pools, arguments.json);
         }
     };
-    if arguments.swing.any() {
-        return Err(
-            "--length, --bending-length, --segments, --from and --substeps are swing's".into()
-        );
-    }
     let scene = Scene::new(kind, arguments.variant.as_deref())?;
     let seconds = arguments.seconds.unwrap_or(scene.kind.frames() as f32 / 60.0);
     let frames = (seconds * 60.0).round() as u64;
@@ -283,23 +302,6 @@ impl<'a> Table<'a> {
         let path = path.display();
         format!("--csv {path} cannot be written: {error}; name a file that can be")
     }
-}
-
-fn swing(arguments: &Arguments) -> Result<(), Box<dyn std::error::Error>> {
-    let scenes_alone = [
-        arguments.variant.is_some(),
-        arguments.seconds.is_some(),
-        arguments.csv.is_some(),
-        arguments.solver.is_some(),
-        arguments.gpu || arguments.no_contact,
-    ];
-    if scenes_alone.contains(&true) {
-        return Err(
-            "--variant, --seconds, --csv, --solver, --gpu and --no-contact are not for swing"
-                .into(),
-        );
-    }
-    print(&arguments.swing.run()?, arguments.json)
 }
 
 /// One JSON object, or lines of name and value.

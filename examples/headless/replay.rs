@@ -39,12 +39,6 @@ pub struct Replay {
     read: Option<PathBuf>,
 }
 
-impl Replay {
-    pub fn any(&self) -> bool {
-        self.write.is_some() || self.read.is_some()
-    }
-}
-
 /// What a player or a game does.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 enum Input {
@@ -271,8 +265,9 @@ fn read(log: impl BufRead, pools: TaskPoolOptions) -> Result<Outcome, Box<dyn st
             .into());
         };
         let off = places.iter().zip(&tips).map(|(a, b)| a.distance(*b));
-        outcome.tips_off.push(off.fold(0.0, f32::max));
-        if now != hash || places.len() != tips.len() {
+        let off = off.fold(0.0, f32::max);
+        outcome.tips_off.push(off);
+        if now != hash || places.len() != tips.len() || off != 0.0 {
             outcome.equal = false;
             outcome.differs_after_seconds.get_or_insert((tick + 1) / HERTZ as u64);
         }

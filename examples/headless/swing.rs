@@ -72,14 +72,6 @@ pub struct Report {
 
 impl Options {
     /// Whether any of them was given.
-    pub fn any(&self) -> bool {
-        self.length.is_some()
-            || self.bending_length.is_some()
-            || self.segments.is_some()
-            || self.from.is_some()
-            || self.substeps.is_some()
-    }
-
     /// Runs it. What is missing was refused when arguments were read.
     pub fn run(&self) -> Result<Report, Box<dyn Error>> {
         let (Some(length), Some(bending_length), Some(segments), Some(from)) =

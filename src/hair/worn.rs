@@ -13,7 +13,10 @@ use crate::{
     hair::strand::Hair,
 };
 use bevy::{
-    ecs::system::{SystemParam, SystemState},
+    ecs::{
+        query::QueryFilter,
+        system::{SystemParam, SystemState},
+    },
     prelude::*,
     reflect::{GetTypeRegistration, Typed},
     utils::prelude::ShortName,
@@ -160,7 +163,17 @@ fn pass_now<T: Passed>(world: &mut World, from: Entity, to: Entity) {
 
 fn acts_from_wearer<T: Passed>(app: &mut App) {
     passed::<T>(app);
-    app.add_systems(HairChecks, report_stray::<T>);
+    acts_only_on::<T, Stray>(app, "no Hair and wears none", "put it on either");
+}
+
+/// Has it reported where a component is on an entity on which it does nothing: which entities are `strays`, and in
+/// words, what they are not and what to do.
+pub(crate) fn acts_only_on<T: Component, Strays: QueryFilter + 'static>(
+    app: &mut App,
+    not: &'static str,
+    instead: &'static str,
+) {
+    app.add_systems(HairChecks, (move || (not, instead)).pipe(report_stray::<T, Strays>));
 }
 
 /// Registers a component that is passed on to hair, and may be on anything.
@@ -177,9 +190,10 @@ type Stray = (Without<Hair>, Without<WornHair>, Without<Wearer>);
 const STRAY_TIME: f32 = 2.0;
 
 /// Says what does nothing where it is.
-fn report_stray<T: Component>(
-    added: Query<Entity, (Added<T>, Stray)>,
-    strays: Query<(), (With<T>, Stray)>,
+fn report_stray<T: Component, Strays: QueryFilter + 'static>(
+    In((not, instead)): In<(&'static str, &'static str)>,
+    added: Query<Entity, (Added<T>, Strays)>,
+    strays: Query<(), (With<T>, Strays)>,
     (hairs, time): (HairsOf, Option<Res<Time<Real>>>),
     mut waiting: Local<Vec<(Entity, f32)>>,
     mut faults: MessageWriter<HairFault>,
@@ -191,9 +205,8 @@ fn report_stray<T: Component>(
             continue;
         }
         let (part, near) = (ShortName::of::<T>(), hairs.near(entity));
-        let message = format!(
-            "`{part}` does nothing here, on an entity that is no Hair and wears none{near}: put it on either"
-        );
+        let message =
+            format!("`{part}` does nothing here, on an entity that is {not}{near}: {instead}");
         faults.write(HairFault::new(FaultKind::NoTarget, message).of(entity));
     }
     waiting.extend(added.iter().map(|entity| (entity, 0.0)));
@@ -228,6 +241,9 @@ impl HairsOf<'_, '_> {
     /// Where hair is above or below an entity that has none, in words that go on from a sentence; empty where there
     /// is none.
     pub(crate) fn near(&self, entity: Entity) -> String {
+        if let Some(itself) = self.described(entity) {
+            return format!("; {itself}");
+        }
         let parent = |of: &Entity| self.parents.get(*of).ok().map(ChildOf::parent);
         let above =
             core::iter::successors(parent(&entity), parent).find_map(|at| self.described(at));

@@ -164,19 +164,13 @@ impl WaterLedger {
 
     /// Counts water that was added (m³), or removed if negative.
     fn record(&mut self, change: f64) {
-        // What an inspector has written and nothing has repaired yet is no water.
-        if !change.is_finite() {
-            return;
-        }
         *(if change > 0.0 { &mut self.water_in } else { &mut self.water_out }) += change.abs();
     }
 
     /// Counts water that was added to hair at once (m³), or removed if negative, also in `held`.
     pub(crate) fn replace(&mut self, change: f64) {
         self.record(change);
-        if change.is_finite() {
-            self.held += change;
-        }
+        self.held += change;
     }
 
     /// |in − held − out| / in, the relative error of the balance; 0 if no water was added.

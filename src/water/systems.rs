@@ -64,11 +64,13 @@ impl Plugin for WaterPlugin {
             .add_observer(shift_droplets)
             .add_observer(count_lost_droplet)
             .add_observer(count_lost_moisture)
-            .add_systems(HairTick, submerge.in_set(HairSystems::Submersion))
+            .add_systems(
+                HairTick,
+                (repair_moistures, submerge).chain().in_set(HairSystems::Submersion),
+            )
             .add_systems(
                 HairTick,
                 (
-                    repair_moistures,
                     count_overwritten,
                     run_showers.run_if(shared_substep),
                     exchange_water.run_if(first_substep),

@@ -112,6 +112,16 @@ fn a_run_that_was_logged_is_replayed_to_the_bit() {
     std::fs::write(other, &text[..text.len() / 2]).unwrap();
     let says = error("headless", &replay(&["--read", other]));
     assert!(says.contains("write the log again") || says.contains("it was cut off"), "{says}");
+    // So is another tip.
+    let state = text.lines().find(|line| line.starts_with("{\"State\"")).expect("a state");
+    let (before, tips) = state.split_once("\"tips\":[[").expect("tips");
+    let (_, after) = tips.split_once(',').unwrap();
+    std::fs::write(other, text.replacen(state, &format!("{before}\"tips\":[[9.0,{after}"), 1))
+        .unwrap();
+    let says = error("headless", &replay(&["--read", other]));
+    assert!(says.contains("differs from its log"), "{says}");
+    let says = error("headless", &replay(&["--read", log, "--solver", "sweeps"]));
+    assert!(says.contains("--solver is not for this scene, which takes --seconds"), "{says}");
     let says = error("headless", &replay(&[]));
     assert!(says.contains("--write LOG and --read LOG"), "{says}");
     std::fs::remove_dir_all(folder).unwrap();

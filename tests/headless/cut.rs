@@ -2,7 +2,7 @@
 
 use crate::common::{fault_kinds, faults, run, strand, test_app};
 use crate::lod::head::fewer;
-use bevy::prelude::*;
+use bevy::{prelude::*, reflect::ReflectMut};
 use bevy_keratin::{
     FaultKind,
     base::schedule::{HairSystems, HairTick},
@@ -223,6 +223,33 @@ fn water_that_is_cut_off_is_drained_to_the_drop() {
     let error = app.world().resource::<WaterLedger>().error();
     assert!(error < 1e-9, "{error}");
     assert_eq!(fault_kinds(&mut app), []);
+}
+
+#[test]
+fn water_that_an_inspector_has_spoiled_is_cut_and_still_in_balance() {
+    for (wrong, node) in [(f64::NEG_INFINITY, 2), (f64::NAN, 2), (f64::INFINITY, NODES - 1)] {
+        let mut app = barber();
+        let (hair, strands) = head(&mut app, Transform::default());
+        app.world_mut().trigger(SoakHair::dripping(hair));
+        run(&mut app, 0.2);
+        {
+            let mut water = app.world_mut().get_mut::<Moisture>(strands[0]).unwrap();
+            let ReflectMut::Struct(parts) = water.reflect_mut() else { panic!() };
+            let ReflectMut::List(film) = parts.field_mut("film").unwrap().reflect_mut() else {
+                panic!()
+            };
+            *film.get_mut(node).unwrap().try_downcast_mut::<f64>().unwrap() = wrong;
+        }
+        request(&mut app, CutHair::all(hair, CutBy::Length(0.1)));
+        run(&mut app, 0.5);
+        let ledger = *app.world().resource::<WaterLedger>();
+        let is_finite =
+            [ledger.water_in, ledger.held, ledger.water_out].iter().all(|n| n.is_finite());
+        assert!(is_finite && ledger.error() < 1e-9, "{wrong} at {node}: {ledger:?}");
+        let water = app.world().get::<Moisture>(strands[0]).unwrap();
+        assert!(water.film().iter().all(|film| film.is_finite() && *film >= 0.0), "{wrong}");
+        assert!(faults(&mut app).len() <= 1, "{wrong}");
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use crate::{
 use bevy::{
     ecs::reflect::{AppTypeRegistry, ReflectComponent},
     prelude::*,
-    reflect::serde::TypedReflectSerializer,
+    reflect::{ReflectMut, serde::TypedReflectSerializer},
 };
 use bevy_keratin::{FaultKind, WearError, authoring::plant::*, prelude::*};
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
@@ -152,6 +152,35 @@ fn components_that_no_file_can_hold_are_refused() {
     let own = app.world_mut().spawn(FollowRecipe(handle)).id();
     app.update();
     assert_eq!(of::<Own>(&app, own).inners, [Inner { x: 1.0, y: 2.0 }]);
+}
+
+/// Around a struct of a game's own.
+#[derive(Component, Reflect, Clone, Debug, Default, PartialEq)]
+#[reflect(Component, Default)]
+struct Around(Pair);
+
+#[derive(Reflect, Clone, Debug, Default, PartialEq)]
+struct Pair {
+    x: f32,
+    y: f32,
+}
+
+#[test]
+fn a_struct_in_a_tuple_is_given_in_part() {
+    let mut app = wear::app();
+    app.register_type::<Around>();
+    for (text, expected) in [
+        ("((y: 3))", Pair { x: 1.0, y: 3.0 }),
+        ("((x: 4))", Pair { x: 4.0, y: 2.0 }),
+        ("((x: 4, y: 3))", Pair { x: 4.0, y: 3.0 }),
+        ("(())", Pair { x: 1.0, y: 2.0 }),
+    ] {
+        let handle = add(&mut app, &format!("(components: {{\"Around\": {text}}})"));
+        let own = Around(Pair { x: 1.0, y: 2.0 });
+        let own = app.world_mut().spawn((own, FollowRecipe(handle))).id();
+        app.update();
+        assert_eq!(of::<Around>(&app, own).0, expected, "{text}");
+    }
 }
 
 #[test]
@@ -382,13 +411,46 @@ fn any_text_is_a_recipe_or_an_error() {
     assert!(app.world().get::<Strands>(hair).is_some());
 }
 
-/// What inspectors and scene files edit: each setting is written as text, and read from it.
+/// Moves the first number of a value, however deep. Whether there is one.
+fn nudge(value: &mut dyn PartialReflect) -> bool {
+    let moved = |number: f64| if number == 0.0 { 1e-3 } else { number * 0.75 };
+    if let Some(number) = value.try_downcast_mut::<f32>() {
+        *number = moved(f64::from(*number)) as f32;
+        return true;
+    }
+    if let Some(number) = value.try_downcast_mut::<f64>() {
+        *number = moved(*number);
+        return true;
+    }
+    if let Some(flag) = value.try_downcast_mut::<bool>() {
+        *flag = !*flag;
+        return true;
+    }
+    match value.reflect_mut() {
+        ReflectMut::Struct(of) => {
+            (0..of.field_len()).any(|i| of.field_at_mut(i).is_some_and(nudge))
+        }
+        ReflectMut::TupleStruct(of) => {
+            (0..of.field_len()).any(|i| of.field_mut(i).is_some_and(nudge))
+        }
+        ReflectMut::Enum(of) => (0..of.field_len()).any(|i| of.field_at_mut(i).is_some_and(nudge)),
+        ReflectMut::List(of) => (0..of.len()).any(|i| of.get_mut(i).is_some_and(nudge)),
+        _ => false,
+    }
+}
+
+/// What inspectors and scene files edit: each setting, with a value that is not its default, is written as text and put
+/// on from it.
 #[test]
-fn every_setting_can_be_written_into_a_file() {
+fn every_setting_is_put_on_as_it_is_written_into_a_file() {
     let mut app = wear::app();
     let registry = app.world().resource::<AppTypeRegistry>().clone();
+    let (mut moved, mut without_a_number) = (Vec::new(), Vec::new());
     let registry = registry.read();
-    let mut tried = 0;
+    let written = |value: &dyn PartialReflect, name: &str| {
+        ron::to_string(&TypedReflectSerializer::new(value, &registry))
+            .unwrap_or_else(|error| panic!("{name}: {error}"))
+    };
     for kind in registry.iter() {
         let table = kind.type_info().type_path_table();
         let (Some(component), Some(default)) =
@@ -399,11 +461,10 @@ fn every_setting_can_be_written_into_a_file() {
         if table.crate_name() != Some("bevy_keratin") {
             continue;
         }
-        let value = default.default();
+        let mut value = default.default();
         let name = table.short_path();
-        let text =
-            ron::to_string(&TypedReflectSerializer::new(value.as_partial_reflect(), &registry))
-                .unwrap_or_else(|error| panic!("{name}: {error}"));
+        let is_moved = nudge(value.as_partial_reflect_mut());
+        let text = written(value.as_partial_reflect(), name);
         let file = format!("(components: {{\"{name}\": {text}}})");
         let recipe = match HairRecipe::from_ron(file.as_bytes(), &registry) {
             // What entities are of whom is no setting.
@@ -411,14 +472,18 @@ fn every_setting_can_be_written_into_a_file() {
             read => read.unwrap_or_else(|error| panic!("{file}: {error}")),
         };
         assert_eq!(recipe.components().collect::<Vec<_>>(), [kind.type_id()], "{name}");
-        let entity = app.world_mut().spawn_empty().id();
-        component.insert(
-            &mut app.world_mut().entity_mut(entity),
-            value.as_partial_reflect(),
-            &registry,
-        );
-        tried += 1;
+        let handle = app.world_mut().resource_mut::<Assets<HairRecipe>>().add(recipe);
+        let entity = app.world_mut().spawn(FollowRecipe(handle)).id();
+        app.update();
+        let put_on = component.reflect(app.world().entity(entity));
+        let put_on = put_on.unwrap_or_else(|| panic!("{name} is not there"));
+        assert_eq!(written(put_on.as_partial_reflect(), name), text, "{name}");
+        app.world_mut().despawn(entity);
+        match is_moved {
+            true => moved.push(name),
+            false => without_a_number.push(name),
+        }
     }
-    println!("{tried} settings");
-    assert!(tried > 40, "{tried}");
+    println!("moved {moved:?}, as it is {without_a_number:?}");
+    assert!(moved.len() > 40, "{}", moved.len());
 }

@@ -103,7 +103,9 @@ impl Likeness {
     fn map_to(&self, other: &Self) -> Option<EntityHashMap<Entity>> {
         let is_same_size = (self.size / other.size).ln().abs() < SAME_SIZE;
         let is_same = |a: &Source, b: &Source| match (a, b) {
-            (Source::Groom(a), Source::Groom(b)) => a.points().as_ptr() == b.points().as_ptr(),
+            (Source::Groom(a, _), Source::Groom(b, _)) => {
+                a.points().as_ptr() == b.points().as_ptr()
+            }
             (Source::Recipe(a), Source::Recipe(b)) => a == b,
             _ => false,
         };

@@ -93,9 +93,18 @@ const WIDTHS: core::ops::RangeInclusive<f32> = 0.06..=3.0;
 /// What a [`HairSource`] names, loaded.
 #[derive(Clone)]
 pub(super) enum Source {
-    Groom(Groom),
+    Groom(Groom, GroomGuides),
     /// Also of a preset.
     Recipe(HairRecipe),
+}
+
+impl Source {
+    /// What of its settings counts as it settles; that of all hair where it has none of its own.
+    fn settles_as(&self) -> Option<(HairStiffness, StrandContact)> {
+        let Self::Recipe(recipe) = self else { return None };
+        let PresetSettings { stiffness, contact, .. } = recipe.settings();
+        Some((stiffness, contact))
+    }
 }
 
 /// What one hair of a wear is made of.
@@ -314,7 +323,10 @@ pub(super) fn make(
     }
     let fitting = fit(&mut order.target.parts, &order.wear)?;
     let each: Vec<WearHair> = order.wear.each().collect();
-    let grown = each.iter().zip(&order.hairs).map(|(wear, input)| grow(wear, input, &fitting));
+    let grown = each.iter().zip(&order.hairs).map(|(wear, input)| match &input.source {
+        Source::Groom(groom, guides) => from_groom(groom, guides, &fitting, &wear.place),
+        Source::Recipe(recipe) => plant(recipe, wear, &fitting, !input.is_kept),
+    });
     let grown: Vec<Grown> = grown.collect::<Result<_, _>>()?;
     let part = &order.target.parts[fitting.part()];
     let to_mesh = fitting.skin[0].to_hair.inverse();
@@ -334,7 +346,8 @@ pub(super) fn make(
         default()
     };
     let hairs = grown.into_iter().zip(&each).zip(&order.hairs).map(|((grown, wear), input)| {
-        (!input.is_kept).then(|| finish(&order, wear, grown, &fitting, &solids, wanted))
+        let of = (wear, &input.source);
+        (!input.is_kept).then(|| finish(&order, of, grown, &fitting, &solids, wanted))
     });
     Ok(Made {
         parent,
@@ -355,7 +368,7 @@ pub(super) fn make(
 #[cfg_attr(not(feature = "save"), allow(unused_variables, reason = "a saved style is put on"))]
 fn finish(
     order: &MakeInput,
-    wear: &WearHair,
+    (wear, source): (&WearHair, &Source),
     grown: Grown,
     fitting: &Fitting,
     solids: &Solids,
@@ -373,7 +386,7 @@ fn finish(
         _ if is_styled => (Settled::as_planted(planted), None),
         Some((strands, fall)) => (Settled { strands, faults: Vec::new() }, Some(fall)),
         None => {
-            let rested = settle(order, fitting, &grown, solids, wanted);
+            let rested = settle(order, fitting, (&grown, source), solids, wanted);
             let fall = Fall::new(planted, &rested.strands);
             (rested, Some(Arc::new(fall)))
         }
@@ -416,7 +429,7 @@ fn shade(target: &Target, fitting: &Fitting, grown: &Grown) -> Vec<Shell> {
 fn settle(
     order: &MakeInput,
     fitting: &Fitting,
-    grown: &Grown,
+    (grown, source): (&Grown, &Source),
     solids: &Solids,
     wanted: &(dyn Fn() -> bool + Sync),
 ) -> Settled {
@@ -446,7 +459,7 @@ fn settle(
     let ahead = SettleAhead {
         strands: &grown.hair.strands,
         materials: &grown.hair.materials,
-        own: grown.settles_as,
+        own: source.settles_as(),
         solids: &solids,
         size: size / scale,
         gravity: down,
@@ -498,9 +511,8 @@ fn old_hair(fitting: &Fitting, parts: &[MeshPart]) -> Vec<Entity> {
 struct Grown {
     hair: GrownStrands,
     roots: Vec<RootOnMesh>,
-    /// Before a recipe has changed them, and what of them counts as it settles, after that.
+    /// Before a recipe has changed them.
     settings: Option<PresetSettings>,
-    settles_as: Option<(HairStiffness, StrandContact)>,
     preset: Option<WornPreset>,
     recipe: Option<HairRecipe>,
     #[cfg(feature = "render")]
@@ -508,19 +520,7 @@ struct Grown {
     fibres: f32,
 }
 
-/// Grows one hair of a wear. One that is kept draws none: only its roots count.
-fn grow(wear: &WearHair, input: &HairInput, fitting: &Fitting) -> Result<Grown, WearError> {
-    match (&wear.hair, &input.source) {
-        (HairSource::Groom { guides, .. }, Source::Groom(groom)) => {
-            from_groom(groom, guides, fitting, &wear.place)
-        }
-        (_, Source::Groom(groom)) => {
-            from_groom(groom, &GroomGuides::default(), fitting, &wear.place)
-        }
-        (_, Source::Recipe(recipe)) => plant(recipe, wear, fitting, !input.is_kept),
-    }
-}
-
+/// Grows hair by a recipe. Hair that is kept draws none: only its roots count.
 #[cfg_attr(not(feature = "render"), allow(unused_variables, reason = "followers are drawn"))]
 fn plant(
     recipe: &HairRecipe,
@@ -578,7 +578,6 @@ fn plant(
         hair,
         roots: planted.roots,
         settings: Some(preset.settings()),
-        settles_as: Some((settings.stiffness, settings.contact)),
         // What a preset grows is known by its name; what a recipe grows, by the recipe.
         preset: matches!(wear.hair, HairSource::Preset(_)).then_some(worn),
         recipe: matches!(wear.hair, HairSource::Recipe(_)).then(|| recipe.clone()),
@@ -609,7 +608,6 @@ fn from_groom(
         hair,
         roots,
         settings: None,
-        settles_as: None,
         preset: None,
         recipe: None,
         #[cfg(feature = "render")]

@@ -363,9 +363,10 @@ impl Finder<'_, '_> {
             };
             let source = |hair: &HairSource| match hair {
                 HairSource::Preset(preset) => Ok(Source::Recipe((*preset).into())),
-                HairSource::Groom { groom, .. } => {
+                HairSource::Groom { groom, guides } => {
                     let loaded = grooms.as_ref().and_then(|grooms| grooms.get(groom));
-                    loaded.cloned().map(Source::Groom).ok_or(("groom", groom.id().untyped()))
+                    let loaded = loaded.map(|groom| Source::Groom(groom.clone(), guides.clone()));
+                    loaded.ok_or(("groom", groom.id().untyped()))
                 }
                 HairSource::Recipe(recipe) => {
                     let loaded = recipes.as_ref().and_then(|recipes| recipes.get(recipe));

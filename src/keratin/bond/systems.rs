@@ -50,6 +50,11 @@ impl Plugin for BondPlugin {
         worn::setting::<BondInfluence>(app);
         worn::setting::<Cuticle>(app);
         setting::component::<StrandMaterial>(app);
+        worn::acts_only_on::<StrandMaterial, Without<Strand>>(
+            app,
+            "no Strand",
+            "put it on strands",
+        );
         keep_required::<Strand, Bonds>(app);
         keep_required::<Strand, BondChanges>(app);
         keep_required::<Strand, RestShape>(app);

@@ -3,7 +3,7 @@
 use crate::common::*;
 use bevy::{asset::AssetPlugin, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
-    MotionOwner, SleepCounts,
+    HairFault, MotionOwner, SleepCounts,
     authoring::groom::{GroomCacheError, alembic},
     hair::strand::StrandHistory,
     prelude::*,
@@ -211,6 +211,9 @@ fn what_cannot_be_a_cache_says_so() {
     assert!(matches!(error, GroomCacheError::Differs { frame: 1, found: 1, expected: 2, .. }));
     let error = made(vec![(0.0, frame(1.0)), (1.0, frame(f32::NAN))]);
     assert_eq!(error, GroomCacheError::NonFinite { frame: 1, node: 1 });
+    // Between two of these is no number.
+    let error = made(vec![(0.0, frame(3e38)), (1.0, frame(-3e38))]);
+    assert_eq!(error, GroomCacheError::NonFinite { frame: 0, node: 1 });
 
     let mut app = app();
     let (id, strands) = hair(&mut app);
@@ -243,6 +246,29 @@ fn what_cannot_be_a_cache_says_so() {
 }
 
 /// Guides of a groom are as many as its strands, but in an order of their own.
+#[test]
+fn caches_and_materials_where_they_do_nothing_are_reported_with_what_is_there() {
+    let mut app = app();
+    let (hair, strands) = hair(&mut app);
+    let character = app.world_mut().spawn_empty().id();
+    app.world_mut().entity_mut(hair).insert((WornBy(character), StrandMaterial::default()));
+    let (play, record) = (PlayGroomCache::default(), RecordGroomCache::default());
+    app.world_mut().entity_mut(character).insert((play.clone(), record));
+    app.world_mut().entity_mut(strands[0]).insert(StrandMaterial::default());
+    run(&mut app, 3.0);
+    app.world_mut().entity_mut(hair).insert((play, record));
+    run(&mut app, 3.0);
+    let reported = faults(&mut app);
+    let is = |what: &str, of: Entity, there: String| {
+        let is_it = |f: &HairFault| f.message.contains(what) && f.entity == Some(of);
+        reported.iter().filter(|f| is_it(f) && f.message.contains(&there)).count() == 1
+    };
+    assert!(is("PlayGroomCache", character, format!("wears {hair}")), "{reported:?}");
+    assert!(is("RecordGroomCache", character, format!("wears {hair}")), "{reported:?}");
+    assert!(is("StrandMaterial", hair, format!("{hair} is a Hair")), "{reported:?}");
+    assert_eq!(reported.len(), 3, "{reported:?}");
+}
+
 #[test]
 fn each_strand_of_a_groom_plays_its_own() {
     let mut app = app();

@@ -35,8 +35,10 @@ pub enum GroomCacheError {
         /// That of the frame before.
         before: f32,
     },
-    /// A node that is not finite.
-    #[error("node {node} of frame {frame} is not finite: repair the source")]
+    /// A node that is not finite, or farther than 10⁹ m away.
+    #[error(
+        "node {node} of frame {frame} is not finite or farther than 1e9 m away: repair the source"
+    )]
     NonFinite {
         /// The frame's index.
         frame: usize,

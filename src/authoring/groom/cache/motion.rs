@@ -4,6 +4,9 @@ use super::error::GroomCacheError;
 use crate::authoring::groom::{Groom, shared::Shared};
 use bevy::prelude::*;
 
+/// Between nodes that are no farther away distances are finite (m).
+const FARTHEST: Vec3 = Vec3::splat(1e9);
+
 /// The motion of a groom: the nodes of all its strands at a number of times (m, in the frame of its hair). An asset, and
 /// immutable like [`Groom`]; a clone shares its arrays.
 ///
@@ -36,7 +39,7 @@ impl GroomCache {
     ///
     /// # Errors
     /// Without a frame, when times do not ascend, or a frame has more or fewer nodes than the groom or one that is not
-    /// finite.
+    /// finite or farther than 10⁹ m away.
     pub fn new(
         groom: Groom,
         frames: impl IntoIterator<Item = (f64, Vec<Vec3>)>,
@@ -62,7 +65,7 @@ impl GroomCache {
             let before = before.unwrap_or_default();
             return Err(GroomCacheError::Time { frame, found: time, before });
         }
-        if let Some(node) = points.iter().position(|p| !p.is_finite()) {
+        if let Some(node) = points.iter().position(|p| !p.abs().cmple(FARTHEST).all()) {
             return Err(GroomCacheError::NonFinite { frame, node });
         }
         self.times.push(time);

@@ -8,9 +8,12 @@ use crate::{
         grid::KdTree,
         schedule::{HairFrame, HairStep, HairSystems, HairTick, last_substep},
     },
-    hair::strand::{
-        CutStrand, Hair, PlayedHair, Regroomed, Settling, SimulatedHere, Strand, StrandHistory,
-        StrandRank, Strands, TickPose,
+    hair::{
+        strand::{
+            CutStrand, Hair, PlayedHair, Regroomed, Settling, SimulatedHere, Strand, StrandHistory,
+            StrandRank, Strands, TickPose,
+        },
+        worn,
     },
 };
 use bevy::{
@@ -102,6 +105,7 @@ struct Playback {
 
 pub(super) fn build(app: &mut App) {
     app.register_type::<PlayGroomCache>().add_observer(stop);
+    worn::acts_only_on::<PlayGroomCache, Without<Hair>>(app, "no Hair", "put it on a hair");
 }
 
 pub(super) fn with_assets(app: &mut App) {

@@ -7,7 +7,10 @@ use crate::{
         fault::{FaultKind, HairFault},
         schedule::{HairStep, HairSystems, HairTick, last_substep},
     },
-    hair::strand::{Hair, OnGpu, RecordedHair, Strand, StrandRank, Strands},
+    hair::{
+        strand::{Hair, OnGpu, RecordedHair, Strand, StrandRank, Strands},
+        worn,
+    },
 };
 use bevy::prelude::*;
 
@@ -55,6 +58,7 @@ struct Recording {
 }
 
 pub(super) fn build(app: &mut App) {
+    worn::acts_only_on::<RecordGroomCache, Without<Hair>>(app, "no Hair", "put it on a hair");
     app.register_type::<RecordGroomCache>()
         .add_observer(begin)
         .add_observer(end)
