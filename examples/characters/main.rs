@@ -23,7 +23,10 @@ use bevy::{asset::UnapprovedPathMode, gltf::Gltf, prelude::*};
 use bevy_keratin::{authoring::plant::HairPreset, prelude::*};
 use clap::Parser;
 use hats::{bring_hat, put_on_hats};
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
 /// Shows hair on characters.
 #[derive(Parser, Resource, Clone)]
@@ -37,6 +40,9 @@ struct Arguments {
     /// Presets by their names, separated by commas; all if left out.
     #[arg(long, value_delimiter = ',', value_parser = preset)]
     presets: Vec<HairPreset>,
+    /// Hair of these recipes, `.recipe.ron`, in place of presets.
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "presets")]
+    recipe: Vec<PathBuf>,
     /// Width and height of each view (pixels).
     #[arg(long, default_value = "400x480", value_parser = renderer::size)]
     size: (u32, u32),
@@ -59,6 +65,13 @@ fn preset(name: &str) -> Result<HairPreset, String> {
     found.ok_or_else(|| {
         format!("expected one of {}", HairPreset::ALL.map(HairPreset::name).join(", "))
     })
+}
+
+/// Hair that is shown, and its name.
+#[derive(Clone)]
+struct Shown {
+    name: String,
+    wear: WearHair,
 }
 
 /// How many characters stand in the window at least.
@@ -118,12 +131,30 @@ impl Arguments {
             // Found from any folder, and where the program was not started by Cargo.
             return Ok(vec![concat!(env!("CARGO_MANIFEST_DIR"), "/assets/figure.glb").into()]);
         }
-        let whole = |file: &PathBuf| {
-            let path = file.canonicalize().map_err(|error| format!("{}: {error}", file.display()));
-            Ok(path?.to_string_lossy().into_owned())
-        };
-        self.files.iter().map(whole).collect()
+        self.files.iter().map(|file| whole(file)).collect()
     }
+
+    /// The hair that is asked for.
+    fn hairs(&self, assets: &AssetServer) -> Result<Vec<Shown>> {
+        let of_preset = |preset: &HairPreset| {
+            Ok(Shown { name: preset.name().to_owned(), wear: WearHair::new(*preset) })
+        };
+        let of_recipe = |file: &PathBuf| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            let name = name.trim_end_matches(".recipe.ron").to_owned();
+            Ok(Shown { name, wear: WearHair::of_recipe(assets.load(whole(file)?)) })
+        };
+        match self.recipe.is_empty() {
+            true => self.presets.iter().map(of_preset).collect(),
+            false => self.recipe.iter().map(of_recipe).collect(),
+        }
+    }
+}
+
+/// The whole path of a file.
+fn whole(file: &Path) -> Result<String> {
+    let path = file.canonicalize().map_err(|error| format!("{}: {error}", file.display()));
+    Ok(path?.to_string_lossy().into_owned())
 }
 
 /// All in a window.
@@ -131,11 +162,12 @@ fn show(arguments: &Arguments) -> Result {
     let files = arguments.files()?;
     let count = files.len().max(MIN_CHARACTERS);
     let mut app = app(arguments, false);
+    let hairs = arguments.hairs(app.world().resource::<AssetServer>())?;
     for i in 0..count {
         let file = files[i % files.len()].clone();
-        let (preset, aside) =
-            (arguments.presets[i % arguments.presets.len()], i as f32 - 0.5 * (count - 1) as f32);
-        spawn(&mut app, file, WearHair::new(preset), Transform::from_xyz(0.8 * aside, 0.0, 0.0));
+        let (shown, aside) = (&hairs[i % hairs.len()], i as f32 - 0.5 * (count - 1) as f32);
+        let at = Transform::from_xyz(0.8 * aside, 0.0, 0.0);
+        spawn(&mut app, file, shown.wear.clone(), at);
     }
     environment::lights(app.world_mut(), 4.0);
     let mut images = app.world_mut().resource_mut::<Assets<Image>>();

@@ -1,7 +1,7 @@
 //! Pictures of each preset on each character, without a window.
 
 use crate::{
-    Arguments, Outcome, app, environment,
+    Arguments, Outcome, Shown, app, environment,
     hats::{self, bring_hat},
     picture::{self, Pictures},
     spawn,
@@ -31,8 +31,8 @@ pub fn shoot(arguments: &Arguments, folder: &Path) -> Result {
     picture::folder(folder)?;
     for file in arguments.files()? {
         let mut app = app(arguments, true);
-        let wear = WearHair::new(arguments.presets[0]);
-        let character = spawn(&mut app, file.clone(), wear, Transform::default());
+        let hairs = arguments.hairs(app.world().resource::<AssetServer>())?;
+        let character = spawn(&mut app, file.clone(), hairs[0].wear.clone(), Transform::default());
         app.add_observer(bring_hat);
         let mut images = app.world_mut().resource_mut::<Assets<Image>>();
         let surroundings = environment::studio(&mut images, 450.0);
@@ -42,9 +42,9 @@ pub fn shoot(arguments: &Arguments, folder: &Path) -> Result {
         let name =
             PathBuf::from(&file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let mut is_lit = false;
-        for preset in &arguments.presets {
+        for Shown { name: of, wear } in hairs {
             app.world_mut().resource_mut::<Outcome>().0 = None;
-            app.world_mut().entity_mut(character).insert(WearHair::new(*preset));
+            app.world_mut().entity_mut(character).insert(wear);
             let hair = wait(&mut app)?;
             thin_out(&mut app, hair, arguments.strands);
             app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
@@ -64,7 +64,7 @@ pub fn shoot(arguments: &Arguments, folder: &Path) -> Result {
             let mut views = Vec::new();
             for from in VIEWS {
                 // Long hair is seen whole.
-                let away = if *preset == HairPreset::Long { 1.7 } else { 1.0 };
+                let away = if of == HairPreset::Long.name() { 1.7 } else { 1.0 };
                 let focus = Vec3::new(0.0, -0.035 - 0.13 * (away - 1.0), 0.0);
                 let [from, to] = [from * Vec3::new(1.0, 1.0, -1.0) * away + focus, focus]
                     .map(|p| head.transform_point3(p));
@@ -78,7 +78,7 @@ pub fn shoot(arguments: &Arguments, folder: &Path) -> Result {
                     .run_system_cached(hats::toggle)
                     .map_err(|error| error.to_string())?;
             }
-            let path = folder.join(format!("{name}-{}.png", preset.name()));
+            let path = folder.join(format!("{name}-{of}.png"));
             picture::save(picture::beside(&views), &path)?;
             println!("{}", path.display());
         }

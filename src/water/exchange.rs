@@ -399,7 +399,7 @@ pub(super) fn bear_water(
     let mut change = 0.0_f32;
     for ((mass, length), volume) in added_mass.mass.iter_mut().zip(node_lengths(lengths)).zip(water)
     {
-        let now = (WATER * volume / (dry * f64::from(length))) as f32;
+        let now = ((WATER * volume / (dry * f64::from(length))) as f32).min(AddedMass::MOST);
         change = change.max((now - *mass).abs() / (1.0 + now));
         *mass = now;
     }

@@ -334,7 +334,7 @@ fn curls_have_the_radius_and_pitch_asked_for() {
 #[test]
 fn curls_turn_together_as_asked() {
     let phases = |phase, clump| {
-        let curl = Curl { radius: 4e-3, pitch: 20e-3, variation: 0.0, phase };
+        let curl = Curl { radius: 4e-3, pitch: 20e-3, variation: 0.0, phase, ..default() };
         let planting = Planting { nodes: 60, curl: Some(curl), clump, ..straight(4e3) };
         let planted = planting.plant(&plane(0.2, 0.2)).unwrap();
         let at = |points: &[Vec3]| {
@@ -353,6 +353,84 @@ fn curls_turn_together_as_asked() {
     let lock = Some(Clump { spacing: 1.0, strength: 0.0 });
     assert!(spread(&phases(CurlPhase::PerClump, lock)) < 1e-3);
     assert!(spread(&phases(CurlPhase::PerStrand, lock)) > 0.6);
+}
+
+/// Where waves of a strand cross its axis (m along it), and by how much they leave the plane that they are in (m).
+fn crossings(points: &[Vec3], way: Vec3) -> (Vec<f32>, f32, Vec3) {
+    let off: Vec<Vec3> =
+        points.iter().map(|p| (*p - points[0]).reject_from_normalized(way)).collect();
+    let widest = off.iter().copied().max_by(|a, b| a.length().total_cmp(&b.length())).unwrap();
+    let side = widest.normalize();
+    let out = off.iter().map(|o| o.reject_from_normalized(side).length()).fold(0.0, f32::max);
+    let along = |i: usize| (points[i] - points[0]).dot(way);
+    let mut at = Vec::new();
+    for i in 1..points.len() {
+        let (a, b) = (off[i - 1].dot(side), off[i].dot(side));
+        // The helix is as wide as asked for after half a turn.
+        if a * b < 0.0 && along(i) > 0.04 {
+            at.push(along(i - 1) + (along(i) - along(i - 1)) * a / (a - b));
+        }
+    }
+    (at, out, side)
+}
+
+#[test]
+fn waves_are_flat_and_drift_as_far_as_asked() {
+    let (lean, pitch) = (0.6_f32, 40e-3);
+    let waves = |flatness, drift| {
+        let curl = Curl {
+            radius: 3e-3,
+            pitch,
+            variation: 0.0,
+            phase: CurlPhase::PerStrand,
+            flatness,
+            drift,
+        };
+        let comb = CombPattern::Along(Vec3::X);
+        let base = Planting { length: 0.3, nodes: 400, lean, comb, ..straight(4e3) };
+        let planted = Planting { curl: Some(curl), ..base }.plant(&plane(0.2, 0.2)).unwrap();
+        let way = Vec3::new(lean.sin(), lean.cos(), 0.0);
+        let strands = planted.groom.strands();
+        strands.map(|strand| crossings(strand.points, way)).collect::<Vec<_>>()
+    };
+    let widest =
+        |of: &[(Vec<f32>, f32, Vec3)]| of.iter().map(|(_, out, _)| *out).fold(0.0, f32::max);
+    assert!(widest(&waves(0.0, 0.0)) > 2.5e-3);
+    assert!(widest(&waves(0.7, 0.0)) < 1.2e-3);
+    let even = waves(1.0, 0.0);
+    assert!(widest(&even) < 2e-5, "{}", widest(&even));
+    for (at, _, side) in &even {
+        // Beside the scalp's normal and the strand, within 40°.
+        assert!(side.dot(Vec3::Z).abs() > 0.7_f32.cos() - 1e-3, "{side}");
+        assert!(
+            at.windows(2).all(|p| ((p[1] - p[0]) / (0.5 * pitch) - 1.0).abs() < 0.01),
+            "{at:?}"
+        );
+    }
+    let drifting = waves(1.0, 0.25);
+    assert!(widest(&drifting) < 2e-5);
+    let mut halves = Vec::new();
+    for (at, _, _) in &drifting {
+        // Where they are beside even ones: within twice a quarter of a turn of the first.
+        for (i, place) in at.iter().enumerate() {
+            let off = place - at[0] - 0.5 * pitch * i as f32;
+            assert!(off.abs() < 0.5 * pitch * 1.02, "{off} m");
+        }
+        halves.extend(at.windows(2).map(|p| (p[1] - p[0]) / (0.5 * pitch)));
+    }
+    let spread = halves.iter().map(|h| (h - 1.0).powi(2)).sum::<f32>() / halves.len() as f32;
+    assert!(spread.sqrt() > 0.1, "{}", spread.sqrt());
+    // Those of a lock drift alike.
+    let curl = Curl { drift: 0.4, flatness: 0.5, variation: 0.0, radius: 3e-3, pitch, ..default() };
+    let lock = Some(Clump { spacing: 1.0, strength: 0.0 });
+    let base = Planting { length: 0.3, nodes: 100, clump: lock, ..straight(4e3) };
+    let planted = Planting { curl: Some(curl), ..base }.plant(&plane(0.2, 0.2)).unwrap();
+    let shape = |points: &[Vec3]| points.iter().map(|p| *p - points[0]).collect::<Vec<_>>();
+    let shapes: Vec<_> = planted.groom.strands().map(|strand| shape(strand.points)).collect();
+    for other in &shapes[1..] {
+        let apart = other.iter().zip(&shapes[0]).map(|(a, b)| a.distance(*b));
+        assert!(apart.fold(0.0, f32::max) < 1e-4);
+    }
 }
 
 #[test]
@@ -585,8 +663,9 @@ fn what_cannot_be_planted_says_why() {
          times and needs 4 nodes a turn"
     );
 
-    let curl =
-        |radius, pitch, variation| Some(Curl { radius, pitch, variation, phase: CurlPhase::Same });
+    let curl = |radius, pitch, variation| {
+        Some(Curl { radius, pitch, variation, phase: CurlPhase::Same, ..default() })
+    };
     let drape =
         |toward, over, clearance, layering| Some(Drape { toward, over, clearance, layering });
     let down = Vec3::NEG_Y;

@@ -26,11 +26,20 @@ const MAX_STEPS: usize = 100_000;
 struct StrandRandom {
     length: f32,
     way: Vec3,
+    normal: Vec3,
     outward: f32,
     curl: Option<Curl>,
     phase: f32,
+    /// How a curl drifts, and how its plane is turned about the strand (rad).
+    drift: u32,
+    plane: f32,
     clearance: f32,
 }
+
+/// How far the planes of flat curls are turned out of the scalp's at most (rad).
+const MOST_TURNED: f32 = 0.7;
+/// Turns in which a curl's drift goes from one random number to the next.
+const DRIFT_TURNS: f32 = 1.5;
 
 /// The polyline of each root of a surface, kept out of a `solid`; `None` where the length map leaves it bald.
 pub(super) fn grow(
@@ -104,6 +113,8 @@ fn draw_random(
     leaders: &[usize],
 ) -> Vec<StrandRandom> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(planting.seed ^ 0x60b0_d4a1);
+    // Of their own, so that strands without are as before there were these.
+    let mut of_curls = Xoshiro256PlusPlus::seed_from_u64(planting.seed ^ 0x5f35_6495);
     let up = planting.drape.map_or(Vec3::ZERO, |drape| -drape.toward.normalize_or_zero());
     let lowest = roots.iter().map(|r| r.place.position.dot(up)).fold(f32::MAX, f32::min);
     let mut draws: Vec<StrandRandom> = Vec::with_capacity(roots.len());
@@ -134,11 +145,22 @@ fn draw_random(
             let layers = drape.layering * (place.position.dot(up) - lowest);
             (drape.clearance + layers * (0.6 + 0.8 * layer)) + curl.map_or(0.0, |c| c.radius)
         });
-        draws.push(StrandRandom { length, way, outward: way.dot(flat), curl, phase, clearance });
+        draws.push(StrandRandom {
+            length,
+            way,
+            normal: flat,
+            outward: way.dot(flat),
+            curl,
+            phase,
+            drift: of_curls.random(),
+            plane: MOST_TURNED * (2.0 * of_curls.random::<f32>() - 1.0),
+            clearance,
+        });
     }
     if planting.curl.is_some_and(|curl| curl.phase == CurlPhase::PerClump) {
         for (i, &leader) in leaders.iter().enumerate() {
-            draws[i].phase = draws[leader].phase;
+            let StrandRandom { phase, drift, plane, .. } = draws[leader];
+            (draws[i].phase, draws[i].drift, draws[i].plane) = (phase, drift, plane);
             let pitch = draws[leader].curl.map_or(1.0, |curl| curl.pitch);
             if let Some(curl) = &mut draws[i].curl {
                 curl.pitch = curl.pitch.abs().copysign(pitch);
@@ -280,7 +302,14 @@ fn curled(axis: &[Vec3], curl: &Curl, drawn: &StrandRandom) -> Vec<Vec3> {
     };
     let step = axis[0].distance(axis[1]);
     let mut along = tangent(0);
-    let mut across = along.any_orthonormal_vector();
+    let mut across = match curl.flatness > 0.0 {
+        true => {
+            let aside = drawn.normal.cross(along).normalize_or(along.any_orthonormal_vector());
+            Quat::from_axis_angle(along, drawn.plane) * aside
+        }
+        false => along.any_orthonormal_vector(),
+    };
+    let round = 1.0 - curl.flatness;
     let grown_over = 0.5 * curl.pitch.abs();
     (0..axis.len())
         .map(|i| {
@@ -289,15 +318,33 @@ fn curled(axis: &[Vec3], curl: &Curl, drawn: &StrandRandom) -> Vec<Vec3> {
             across = across.reject_from_normalized(next).normalize_or(across);
             along = next;
             let passed = step * i as f32;
-            let angle = drawn.phase + TAU * passed / curl.pitch;
+            let [sooner, wider] = match curl.drift > 0.0 {
+                true => [0, 1].map(|of| {
+                    let turns = passed / curl.pitch.abs() / DRIFT_TURNS;
+                    curl.drift * noise(drawn.drift.wrapping_add(of), turns)
+                }),
+                false => [0.0, 0.0],
+            };
+            let angle = drawn.phase + TAU * passed / curl.pitch + TAU * sooner;
             // The radius grows from the root on, no faster than the axis leaves the scalp.
             let grown = (passed / grown_over).min(1.0);
             let grown = sin(grown * FRAC_PI_2);
-            let radius = (curl.radius * grown * grown).min(0.7 * drawn.outward * passed);
-            let side = along.cross(across);
+            let radius = curl.radius * (1.0 + wider);
+            let radius = (radius * grown * grown).min(0.7 * drawn.outward * passed);
+            let side = along.cross(across) * round;
             axis[i] + (across * cos(angle) + side * sin(angle)) * radius
         })
         .collect()
+}
+
+/// Smooth noise in −1 ... 1, random at each whole number.
+fn noise(seed: u32, at: f32) -> f32 {
+    let (piece, share) = (at.max(0.0).floor(), at.max(0.0).fract());
+    let knot = |after: u32| {
+        let knot = u64::from(seed) << 32 | u64::from(piece as u32 + after);
+        Xoshiro256PlusPlus::seed_from_u64(knot).random::<f32>()
+    };
+    2.0 * knot(0).lerp(knot(1), share * share * (3.0 - 2.0 * share)) - 1.0
 }
 
 /// Resamples a line to `segments` pieces of that length, extended straight if it is too short.

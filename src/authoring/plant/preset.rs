@@ -193,9 +193,9 @@ type Guides = ([f32; 5], u32, [f32; 2], [f32; 2], [f32; 3]);
 const GUIDES: [Guides; 13] = [
     // Each guide bends by itself: together they would shine in bands.
     ([0.35e4, 0.3, 0.1, 1.2, 0.06], 24, [0.95e-3, 54e-3], [25e-3, 0.25], [0.035, 5e-3, 0.07]), // Straight
-    // Waves that several guides share: one guide's would look like spots.
-    ([0.33e4, 0.33, 0.1, 1.2, 0.06], 28, [6e-3, 60e-3], [45e-3, 0.2], [0.035, 5e-3, 0.12]), // Wavy
-    ([0.21e4, 0.34, 0.1, 0.9, 0.06], 48, [7e-3, 26e-3], [0.0, 0.0], [0.05, 5e-3, 0.2]),     // Curly
+    // Waves that a few guides share: one guide's would look like spots, those of many like bands.
+    ([0.33e4, 0.33, 0.1, 1.2, 0.06], 28, [7e-3, 60e-3], [25e-3, 0.3], [0.035, 5e-3, 0.12]), // Wavy
+    ([0.21e4, 0.34, 0.2, 0.9, 0.06], 48, [7e-3, 26e-3], [0.0, 0.0], [0.05, 5e-3, 0.2]),     // Curly
     ([0.58e4, 0.17, 0.15, 0.0, 0.25], 36, [3.5e-3, 9e-3], [0.0, 0.0], [0.0, 0.0, 0.0]),     // Coily
     ([0.8e4, 0.065, 0.2, 1.2, 0.12], 10, [0.0, 0.0], [14e-3, 0.25], [0.09, 4e-3, 0.03]),    // Short
     ([0.35e4, 0.32, 0.04, 1.2, 0.06], 18, [0.0, 0.0], [25e-3, 0.15], [0.035, 5e-3, 0.09]),  // Bob
@@ -219,6 +219,12 @@ impl HairPreset {
             Self::Wavy => CurlPhase::PerClump,
             _ => CurlPhase::PerStrand,
         };
+        let [variation, drift, flatness] = match self {
+            Self::Wavy => [0.12, 0.25, 0.6],
+            // Curls as alike as wound ones would hang in columns.
+            Self::Curly => [0.3, 0.3, 0.0],
+            _ => [0.12, 0.0, 0.0],
+        };
         let comb = match self {
             Self::Coily => CombPattern::Out,
             Self::Short => CombPattern::Whorl { center: scalp.place(0.05, 0.9, -0.35), turn: 0.5 },
@@ -234,7 +240,14 @@ impl HairPreset {
             comb,
             lean,
             jitter,
-            curl: (radius > 0.0).then_some(Curl { radius, pitch, variation: 0.12, phase }),
+            curl: (radius > 0.0).then_some(Curl {
+                radius,
+                pitch,
+                variation,
+                phase,
+                drift,
+                flatness,
+            }),
             clump: (spacing > 0.0).then_some(Clump { spacing, strength }),
             drape: (over > 0.0).then_some(Drape {
                 toward: -up - front * 0.15,

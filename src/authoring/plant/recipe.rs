@@ -165,6 +165,11 @@ setting! {
             "0.025 is a finger's curl";
         /// By how much radius and pitch may differ from strand to strand, a share.
         pub variation: f32 = 0.1, in VARIATION: 0.0..=0.9, "0.1 is natural";
+        /// How uneven turns are along a strand: they come up to this share of a turn sooner or later than even ones, and are
+        /// up to this share wider or narrower. Strands that share their phase share it.
+        pub drift: f32 = 0.0, in DRIFT: 0.0..=0.5, "0.25 is a wave that has grown, 0 one that was wound";
+        /// How flat the helix is: 1 is a wave in a plane, along the scalp within 40°.
+        pub flatness: f32 = 0.0, in FLATNESS: 0.0..=1.0, "0.7 is a wave, 0 a curl";
         /// Which strands share their phase.
         pub phase: CurlPhase = CurlPhase::PerClump;
     }

@@ -8,7 +8,7 @@ use super::{
 use crate::authoring::plant::{HairPreset, Hairline, Planting};
 use bevy::{
     asset::{AssetLoader, LoadContext, io::Reader},
-    ecs::reflect::{AppTypeRegistry, ReflectComponent},
+    ecs::reflect::{AppTypeRegistry, ReflectComponent, ReflectResource},
     prelude::*,
     reflect::{
         TypeInfo, TypeRegistration, TypeRegistry, TypeRegistryArc, Typed, enums::VariantInfo,
@@ -124,7 +124,7 @@ fn of<T: Typed, E: Error>(registry: &TypeRegistry) -> Result<Partial<'_>, E> {
         let name = T::type_path();
         E::custom(format_args!("{name} is not registered: add HairPlugins to the app"))
     };
-    Ok(Partial { of: registry.get(TypeId::of::<T>()).ok_or_else(missing)?, registry })
+    Ok(Partial::new(registry.get(TypeId::of::<T>()).ok_or_else(missing)?, registry))
 }
 
 struct ComponentsOf<'a>(&'a TypeRegistry);
@@ -153,7 +153,7 @@ impl<'de> Visitor<'de> for ComponentsOf<'_> {
             if found.iter().any(|(of, _)| *of == id) {
                 return Err(A::Error::custom(format_args!("{name:?} is there twice")));
             }
-            let value = all.next_value_seed(Partial { of: registration, registry })?;
+            let value = all.next_value_seed(Partial::new(registration, registry))?;
             let value = match registration.data::<ReflectDefault>() {
                 Some(default) => {
                     let mut default = default.default();
@@ -178,6 +178,9 @@ fn component_named<'a>(
     let found = by_name.or_else(|| registry.get_with_type_path(name));
     if found.is_some_and(|found| names_entities(found.type_info(), registry, 0)) {
         return Err(format!("{name:?} names entities, which a file does not know"));
+    }
+    if found.is_some_and(|found| found.contains::<ReflectResource>()) {
+        return Err(format!("{name:?} is a resource of the world, expected a component of hair"));
     }
     let is_component = |found: &&TypeRegistration| found.contains::<ReflectComponent>();
     if let Some(found) = found.filter(is_component) {

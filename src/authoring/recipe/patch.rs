@@ -40,14 +40,6 @@ pub(super) fn patch(
             Ok(())
         }
         (ReflectMut::List(to), ReflectRef::List(from)) => {
-            // What could not be made of a file's fields is no value of any type.
-            if let Some(value) = from.iter().find(|value| value.try_as_reflect().is_none()) {
-                let of = value.get_represented_type_info().map_or("value", |info| info.type_path());
-                return Err(ApplyError::MismatchedTypes {
-                    from_type: format!("{of} of which fields are missing").into(),
-                    to_type: format!("{of} without a default").into(),
-                });
-            }
             to.drain();
             from.iter().for_each(|value| to.push(value.to_dynamic()));
             Ok(())

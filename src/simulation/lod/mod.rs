@@ -151,6 +151,11 @@ pub struct PresentLod {
 }
 
 impl PresentLod {
+    /// In full from now on. Followers are counted until they are let go.
+    fn in_full(&self) -> Self {
+        Self { followers: self.followers, ..Self::default() }
+    }
+
     /// The share of the strands that is to be simulated.
     pub(crate) fn simulated_share(&self) -> f32 {
         self.strands.unwrap_or(1.0)

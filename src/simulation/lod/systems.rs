@@ -24,7 +24,7 @@ use crate::{
     keratin::bond::{BondInfluence, Bonds},
     water::IsWet,
 };
-use bevy::prelude::*;
+use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
 /// Levels of detail of the simulation.
 pub struct LodPlugin;
@@ -80,16 +80,22 @@ struct Reported {
 type Rebuilt =
     (Entity, &'static StrandOf, &'static mut Strand, Option<&'static Bonds>, Has<KinematicStrand>);
 
-/// A strand that is written into until it is not finite is put back by its next step. Those of which there is none get the
-/// pose that their bonds remember.
+/// A strand that is written into until it is not finite is put back by its next step. Those of which there is none, or none
+/// before their hair freezes, get the pose that their bonds remember.
 fn rebuild_broken(
     influence: Settings<BondInfluence>,
-    hairs: Query<&MotionOwner, With<Hair>>,
-    mut strands: Query<Rebuilt, Changed<Strand>>,
+    hairs: Query<(Entity, Ref<MotionOwner>), With<Hair>>,
+    mut strands: Query<Rebuilt>,
     mut faults: MessageWriter<HairFault>,
 ) {
+    let frozen = hairs.iter().filter(|(_, owner)| **owner == MotionOwner::Frozen);
+    let newly: EntityHashSet =
+        frozen.filter(|(_, owner)| owner.is_changed()).map(|(hair, _)| hair).collect();
     for (entity, of, mut strand, bonds, is_kinematic) in &mut strands {
-        let is_frozen = || hairs.get(of.0).is_ok_and(|owner| *owner == MotionOwner::Frozen);
+        if !strand.is_changed() && !newly.contains(&of.0) {
+            continue;
+        }
+        let is_frozen = || hairs.get(of.0).is_ok_and(|(_, owner)| *owner == MotionOwner::Frozen);
         if strand.is_finite() || !(is_kinematic || is_frozen()) {
             continue;
         }
@@ -104,7 +110,7 @@ fn rebuild_broken(
 /// Hair without levels is simulated in full.
 fn reset_level(left: On<Remove, HairLod>, mut hairs: Query<(&mut PresentLod, &mut SubstepLimits)>) {
     if let Ok((mut present, mut limits)) = hairs.get_mut(left.entity) {
-        (*present, *limits) = default();
+        (*present, *limits) = (present.in_full(), default());
     }
 }
 
@@ -152,7 +158,7 @@ fn choose(
                     left_out = Some((cost, hair));
                 }
                 if present.level > 0 {
-                    (*present, *limits) = default();
+                    (*present, *limits) = (present.in_full(), default());
                 }
                 return None;
             }

@@ -139,6 +139,20 @@ fn a_frozen_strand_that_is_written_into_is_rebuilt() {
     }
     let reported = faults(&mut app);
     assert!(matches!(&reported[..], [f] if f.kind == FaultKind::Rebuilt), "{reported:?}");
+    // In the frame in which it freezes, so that no step comes of it.
+    for spoil in [(|strand| strand.positions_mut()[5].y = f32::NAN) as fn(&mut Strand), |strand| {
+        strand.velocities_mut()[8].x = f32::NAN
+    }] {
+        app.world_mut().entity_mut(hair).remove::<HairLod>();
+        run(&mut app, 0.1);
+        assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Simulated));
+        spoil(&mut app.world_mut().get_mut::<Strand>(id).unwrap());
+        let small = LodLevel { below: 10.0, strands: 0.0, ..default() };
+        app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![small], ..default() });
+        run(&mut app, 0.1);
+        assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
+        assert!(strand(&app, id).is_finite() && strand(&app, id).peak_strain() < 0.01);
+    }
 }
 
 /// Pops the last item of a list in a component's private part.
@@ -151,6 +165,26 @@ fn pop<C: Component<Mutability = bevy::ecs::component::Mutable> + Reflect>(
     let ReflectMut::Struct(parts) = component.reflect_mut() else { panic!() };
     let ReflectMut::List(list) = parts.field_mut(part).unwrap().reflect_mut() else { panic!() };
     list.pop();
+}
+
+#[test]
+fn a_litre_of_water_on_a_node_is_borne_without_a_report() {
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    app.world_mut().trigger(SoakHair::dripping(hair));
+    run(&mut app, 0.1);
+    {
+        let mut water = app.world_mut().get_mut::<Moisture>(id).unwrap();
+        let ReflectMut::Struct(parts) = water.reflect_mut() else { panic!() };
+        let ReflectMut::List(film) = parts.field_mut("film").unwrap().reflect_mut() else {
+            panic!()
+        };
+        *film.get_mut(8).unwrap().try_downcast_mut::<f64>().unwrap() = 1e-3;
+    }
+    run(&mut app, 0.2);
+    assert!(strand(&app, id).is_finite());
+    assert_eq!(faults(&mut app), []);
+    assert!(app.world().resource::<WaterLedger>().error() < 1e-9);
 }
 
 #[test]

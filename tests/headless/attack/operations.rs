@@ -235,7 +235,7 @@ pub fn find_dead(app: &mut App) -> Option<String> {
         let hair = world.spawn(Hair).id();
         world
             .entity_mut(*entity)
-            .remove::<(HeldNodes, WoundOn, Disabled)>()
+            .remove::<(HeldNodes, WoundOn, Disabled, StrandMaterial)>()
             .insert((StrandOf(hair), Moisture::default()));
     }
     // What was put on the strands is noticed, and what has been wrong is repaired.

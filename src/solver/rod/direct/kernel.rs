@@ -437,7 +437,8 @@ pub(crate) fn finish<W: Width>(
         let kept = w.get4(&edge.q);
         let q = choose(crushed, kept, parallel_transport(kept, e, length).0);
         w.put4(q, &mut edge.q);
-        sum = q.dot(q) + sum;
+        // Of a strand of a thousand kilometres it may overflow where places do not.
+        sum = q.dot(q) + sum + w.get(&edge.tension);
         let (t, k) = (q.tangent(), w.get(&edge.k));
         let rest = w.get4(&edge.rest);
         let torsion = stage.torsion.less(w.get(&edge.twist_loss));
