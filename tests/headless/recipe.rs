@@ -463,6 +463,8 @@ fn nudge(value: &mut dyn PartialReflect) -> bool {
 fn every_setting_is_put_on_as_it_is_written_into_a_file() {
     let mut app = wear::app();
     let registry = app.world().resource::<AppTypeRegistry>().clone();
+    // Nothing acts on them meanwhile: a shower would rain.
+    app.world_mut().resource_mut::<Time<Virtual>>().pause();
     let (mut moved, mut without_a_number) = (Vec::new(), Vec::new());
     let registry = registry.read();
     let written = |value: &dyn PartialReflect, name: &str| {
