@@ -365,7 +365,7 @@ impl Finder<'_, '_> {
                 HairSource::Preset(preset) => Ok(Source::Recipe((*preset).into())),
                 HairSource::Groom { groom, guides } => {
                     let loaded = grooms.as_ref().and_then(|grooms| grooms.get(groom));
-                    let loaded = loaded.map(|groom| Source::Groom(groom.clone(), guides.clone()));
+                    let loaded = loaded.map(|groom| Source::Groom(groom.clone(), *guides));
                     loaded.ok_or(("groom", groom.id().untyped()))
                 }
                 HairSource::Recipe(recipe) => {

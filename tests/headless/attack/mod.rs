@@ -141,7 +141,7 @@ fn a_frozen_strand_that_is_written_into_is_rebuilt() {
     assert!(matches!(&reported[..], [f] if f.kind == FaultKind::Rebuilt), "{reported:?}");
     // In the frame in which it freezes, so that no step comes of it.
     for spoil in [(|strand| strand.positions_mut()[5].y = f32::NAN) as fn(&mut Strand), |strand| {
-        strand.velocities_mut()[8].x = f32::NAN
+        strand.velocities_mut()[8].x = f32::NAN;
     }] {
         app.world_mut().entity_mut(hair).remove::<HairLod>();
         run(&mut app, 0.1);
