@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release --example characters -- [FILE.glb…] [--shot DIR]`
 //!
-//! With `--shot` there is no window: each preset on each character from the front, the side, behind and above; with
+//! With `--shot` there is no window: each preset, or recipe, on each character from the front, the side, behind and above; with
 //! `--hats` a second after the hat is put on.
 
 #[path = "../shared/environment.rs"]

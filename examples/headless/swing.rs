@@ -71,7 +71,6 @@ pub struct Report {
 }
 
 impl Options {
-    /// Whether any of them was given.
     /// Runs it. What is missing was refused when arguments were read.
     pub fn run(&self) -> Result<Report, Box<dyn Error>> {
         let (Some(length), Some(bending_length), Some(segments), Some(from)) =

@@ -317,7 +317,7 @@ impl Moisture {
     /// Marks its water as counted. Returns the difference to what was counted before (m³).
     pub(super) fn recount(&mut self) -> f64 {
         let volume = self.volume();
-        // What an inspector has spoiled counts as before until the next exchange has mended it.
+        // What an inspector has spoiled counts as before until the next tick has mended it.
         if !volume.is_finite() {
             return 0.0;
         }
