@@ -4,7 +4,6 @@ use super::{
     HairWetting,
     field::{Falling, Field, Puller},
     model,
-    moisture::node_lengths,
     strand_block::{NodeSlice, StrandBlock, StrandLane},
 };
 use crate::base::grid::FoundBalls;
@@ -16,6 +15,9 @@ use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*, u32x16};
 
 /// Squared distance (m²) from a droplet's centre up to which there is no direction of pull.
 const SAME_PLACE: f32 = 1e-18;
+
+/// How much of an edge is nearer to an end than its middle, and a little more: edges may be stretched.
+const MIDDLE: f32 = 0.51;
 
 /// Largest upward acceleration by droplets, as a share of gravity.
 const LIFT: f32 = 0.2;
@@ -350,9 +352,11 @@ impl ContactParams<'_> {
     ) {
         for (drop, seen) in self.field.on(strand_lane.strand) {
             let touch = seen.touch(self.wetting.lock_radius());
-            for (node, length) in node_lengths(strand_lane.lengths).enumerate() {
-                let near = touch.max(0.5 * length);
-                if strand_lane.positions[node].distance_squared(seen.at) < near * near {
+            let lengths = strand_lane.lengths;
+            for (node, place) in strand_lane.positions.iter().enumerate() {
+                let edges = &lengths[node.saturating_sub(1)..lengths.len().min(node + 1)];
+                let near = edges.iter().fold(touch, |near, edge| near.max(MIDDLE * edge));
+                if place.distance_squared(seen.at) < near * near {
                     self.want(drop, strand, node, strand_lane.film, out);
                 }
             }
@@ -397,7 +401,10 @@ fn hit_edges<S: Simd>(simd: S, ends: &[NodeSlice], falling: &Falling) -> (u64, L
 
 #[cfg(test)]
 mod tests {
-    use super::{super::field::LocalDrop, *};
+    use super::{
+        super::{field::LocalDrop, moisture::node_lengths},
+        *,
+    };
 
     fn drop(at: Vec3) -> LocalDrop {
         LocalDrop {
@@ -422,7 +429,8 @@ mod tests {
         const LENGTHS: [f32; 8] = [0.03; 8];
         let strand = Entity::from_raw_u32(7 + i).unwrap();
         let lengths = &LENGTHS[..positions.len() - 1];
-        StrandLane { strand, positions, velocities, lengths, load: &[], film: &[] }
+        let is_free = true;
+        StrandLane { strand, positions, velocities, is_free, lengths, load: &[], film: &[] }
     }
 
     fn contact_params<'a>(

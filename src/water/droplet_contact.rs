@@ -22,7 +22,8 @@ use crate::{
         environment::{Gravity, vapour::WATER},
     },
     hair::strand::{
-        AddedMass, Hair, Here, PerHair, Pose, Strand, StrandOf, StrandRank, StrandSleep, TickPose,
+        AddedMass, Hair, Here, KinematicStrand, MotionOwner, PerHair, Pose, Strand, StrandOf,
+        StrandRank, StrandSleep, TickPose,
     },
 };
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
@@ -73,6 +74,7 @@ type Buffers = (Vec<Option<WetStrand<'static>>>, Vec<WetStrand<'static>>);
 /// A hair and its strands among droplets.
 struct WetHair<'a> {
     pose: Pose,
+    owner: MotionOwner,
     wetting: HairWetting,
     /// The droplets that may reach it in this substep, by their numbers.
     drops: Vec<u32>,
@@ -83,6 +85,7 @@ struct WetStrand<'a> {
     entity: Entity,
     rank: StrandRank,
     strand: Mut<'a, Strand>,
+    is_free: bool,
     added_mass: &'a AddedMass,
     moisture: Mut<'a, Moisture>,
 }
@@ -101,7 +104,7 @@ struct Outcome {
 
 /// What droplets act on, as a query reads it.
 type AmongDroplets = (
-    (Entity, &'static StrandRank),
+    (Entity, &'static StrandRank, Has<KinematicStrand>),
     &'static StrandOf,
     &'static mut Strand,
     &'static mut AddedMass,
@@ -110,7 +113,12 @@ type AmongDroplets = (
 );
 
 /// Hair among droplets, as a query reads it.
-type RainedOn = (Entity, &'static TickPose, &'static mut StrandBlocks, Option<&'static HairReach>);
+type RainedOn = (
+    (Entity, &'static MotionOwner),
+    &'static TickPose,
+    &'static mut StrandBlocks,
+    Option<&'static HairReach>,
+);
 
 pub(super) fn wet_strands(
     (step, steps): (Res<HairStep>, EffectiveSubsteps),
@@ -168,7 +176,7 @@ pub(super) fn wet_strands(
     outcomes.resize(drops.len(), Outcome::default());
     let mut wet_hairs = wet_hairs(&mut hairs, &wetting, &mut strands, &drops, buffers);
     fields.resize_with(fields.len().max(wet_hairs.len()), default);
-    for (WetHair { pose, wetting, drops: near, strands }, (field, chunks)) in
+    for (WetHair { pose, wetting, drops: near, strands, .. }, (field, chunks)) in
         wet_hairs.iter_mut().zip(&mut *fields)
     {
         field.set_drops(near.iter().map(|k| &*drops[*k as usize]), pose);
@@ -216,8 +224,9 @@ pub(super) fn wet_strands(
             drop.lying = 0.0;
         }
         if let Some(ride) = drop.ride
-            && let Ok((_, of, mut strand, mut added_mass, ..)) = strands.get_mut(ride.strand)
-            && let Ok((_, pose, ..)) = hairs.get(of.0)
+            && let Ok(((_, _, is_kinematic), of, mut strand, mut added_mass, ..)) =
+                strands.get_mut(ride.strand)
+            && let Ok(((_, owner), pose, ..)) = hairs.get(of.0)
         {
             drop.hair = Some(of.0);
             let (pose, wetting) = (pose.now(), wetting.of(of.0));
@@ -231,9 +240,16 @@ pub(super) fn wet_strands(
                 let lands_at = pose.direction_out(on_strand(strand, ride.at).1);
                 impulse += pose.direction_in(drop.velocity - lands_at) * mass_of(drop);
             }
-            push(strand, added_mass, &wetting, ride.at, impulse);
+            if is_free(*owner, is_kinematic) {
+                push(strand, added_mass, &wetting, ride.at, impulse);
+            }
         }
     }
+}
+
+/// Whether a strand keeps the velocity that droplets give it, and a step takes it on.
+fn is_free(owner: MotionOwner, is_kinematic: bool) -> bool {
+    !is_kinematic && !matches!(owner, MotionOwner::Frozen | MotionOwner::Played)
 }
 
 /// A ball (m) around all that a droplet acts on in a substep, of locks of a radius of up to `clearance`.
@@ -253,14 +269,15 @@ fn wet_hairs<'a>(
 ) -> Vec<WetHair<'a>> {
     let mut wet_hairs: PerHair<(Entity, WetHair<'a>, Vec<Option<WetStrand<'a>>>)> = default();
     let mut unused = core::mem::take(buffers).into_iter();
-    let locks =
-        hairs.iter().map(|(hair, frame, ..)| wetting.of(hair).lock_radius() * frame.now().scale);
+    let locks = hairs
+        .iter()
+        .map(|((hair, _), frame, ..)| wetting.of(hair).lock_radius() * frame.now().scale);
     let widest = locks.fold(0.0, f32::max);
     let balls = (0..).zip(drops).map(|(k, drop)| (ball_of(drop, widest), k));
     let balls = Colliders::of_balls(hairs.iter().count(), balls);
     let mut scratch = Vec::new();
     let mut near = EntityHashMap::<Vec<u32>>::default();
-    for (hair, frame, _, reach) in hairs.iter() {
+    for ((hair, _), frame, _, reach) in hairs.iter() {
         // None of those that only wider locks of other hair would meet.
         let clearance = wetting.of(hair).lock_radius() * frame.now().scale;
         let ball = |k: u32| ball_of(&drops[k as usize], clearance);
@@ -275,23 +292,26 @@ fn wet_hairs<'a>(
         *buffers = unused.collect();
         return Vec::new();
     }
-    for ((entity, rank), of, strand, added_mass, moisture, _) in strands {
+    for ((entity, rank, is_kinematic), of, strand, added_mass, moisture, _) in strands {
         let index = wet_hairs.index(of.0, || {
-            let (_, frame, ..) = hairs.get(of.0).ok()?;
+            let ((_, owner), frame, ..) = hairs.get(of.0).ok()?;
             let drops = near.remove(&of.0)?;
             let (pose, wetting) = (*frame.now(), wetting.of(of.0));
             let (unsorted, sorted) = unused.next().unwrap_or_default();
-            let wet_hair = WetHair { pose, wetting, drops, strands: emptied(sorted) };
+            let (owner, strands) = (*owner, emptied(sorted));
+            let wet_hair = WetHair { pose, owner, wetting, drops, strands };
             Some((of.0, wet_hair, emptied(unsorted)))
         });
         if let Some(index) = index
             && strand.nodes() >= 2
         {
             let added_mass = &*added_mass.into_inner();
-            wet_hairs.values[index].2.push(Some(WetStrand {
+            let (_, WetHair { owner, .. }, unsorted) = &mut wet_hairs.values[index];
+            unsorted.push(Some(WetStrand {
                 entity,
                 rank: *rank,
                 strand,
+                is_free: is_free(*owner, is_kinematic),
                 added_mass,
                 moisture,
             }));
@@ -395,6 +415,7 @@ impl WetStrand<'_> {
             strand: self.entity,
             positions,
             velocities,
+            is_free: self.is_free,
             lengths,
             load: &self.added_mass.mass,
             film: self.moisture.film(),

@@ -19,6 +19,8 @@ pub(super) struct StrandLane<'a> {
     pub strand: Entity,
     pub positions: &'a [Vec3],
     pub velocities: &'a mut [Vec3],
+    /// Whether it keeps the velocities that droplets give it.
+    pub is_free: bool,
     pub lengths: &'a [f32],
     /// Added mass of each node over its dry mass; empty for none.
     pub load: &'a [f32],
@@ -162,10 +164,10 @@ impl StrandBlock {
         }
     }
 
-    /// Writes velocities back.
+    /// Writes velocities of free strands back.
     pub fn scatter(&self, strand_lanes: &mut [StrandLane<'_>]) {
         for (group, four) in strand_lanes.chunks_mut(4).enumerate() {
-            let is_whole = have_nodes(self.rows.len(), four);
+            let is_whole = have_nodes(self.rows.len(), four) && four.iter().all(|m| m.is_free);
             if let [a, b, c, d] = &mut *four
                 && is_whole
             {
@@ -173,7 +175,8 @@ impl StrandBlock {
                 take_vectors(&self.rows, group, four, |row| &row.v);
                 continue;
             }
-            for (lane, strand_lane) in (4 * group..).zip(four) {
+            let free = (4 * group..).zip(four).filter(|(_, strand_lane)| strand_lane.is_free);
+            for (lane, strand_lane) in free {
                 for (v, row) in strand_lane.velocities.iter_mut().zip(&self.rows) {
                     *v = take3(&row.v, lane);
                 }
@@ -288,7 +291,8 @@ mod tests {
                 .map(|(s, ((positions, lengths), velocities))| {
                     let load: &[f32] = if s == 2 { &[0.5, 0.25] } else { &[] };
                     let strand = Entity::from_raw_u32(s).unwrap();
-                    StrandLane { strand, positions, velocities, lengths, load, film: &[] }
+                    let is_free = s != 9;
+                    StrandLane { strand, positions, velocities, is_free, lengths, load, film: &[] }
                 })
                 .collect();
             let (mut strand_block, wetting) = (StrandBlock::default(), HairWetting::default());
@@ -320,8 +324,13 @@ mod tests {
                 row.v = row.v.map(|v| v.map(|v| 2.0 * v));
             }
             strand_block.scatter(&mut strand_lanes);
-            let doubled = |v: &Vec<Vec3>| v.iter().map(|v| *v * 2.0).collect::<Vec<_>>();
-            assert_eq!(velocities, before.iter().map(doubled).collect::<Vec<_>>());
+            // One is not free.
+            for (s, (velocities, before)) in velocities.iter().zip(&before).enumerate() {
+                let times = if s == 9 { 1.0 } else { 2.0 };
+                assert!(
+                    velocities.iter().eq(&before.iter().map(|v| *v * times).collect::<Vec<_>>())
+                );
+            }
         }
     }
 
@@ -337,6 +346,7 @@ mod tests {
                 strand: Entity::PLACEHOLDER,
                 positions: core::slice::from_ref(place),
                 velocities,
+                is_free: true,
                 lengths: &[],
                 load: &[],
                 film: &[],

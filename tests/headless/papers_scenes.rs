@@ -154,9 +154,9 @@ fn a_swing_that_cannot_be_says_why() {
     assert!(error(&["--length", "1"]).contains("--segments"));
     let strand = ["--length", "1", "--segments", "8"];
     assert!(error(&[&strand[..], &["--substeps", "0"]].concat()).contains("expected 1 to 1000"));
-    assert!(error(&[&strand[..], &["--seconds", "1"]].concat()).contains("not for swing"));
+    assert!(error(&[&strand[..], &["--seconds", "1"]].concat()).contains("--seconds is not for"));
     let out = headless(&["--scene", "perm", "--length", "1"]);
-    assert!(String::from_utf8_lossy(&out.stderr).contains("swing's"));
+    assert!(String::from_utf8_lossy(&out.stderr).contains("--length is not for"));
 }
 
 #[test]

@@ -429,6 +429,23 @@ fn droplets_fall_on_hair_without_edges() {
     assert_eq!(faults(&mut app).len(), 1, "of the strand");
 }
 
+/// Wherever it hangs: on the last edge, too, of which the tip has a half.
+#[test]
+fn a_drop_anywhere_on_an_edge_is_taken_up() {
+    for at in [0.5, 3.5, 7.2, 7.5, 7.6, 7.7, 7.8] {
+        let mut app = test_app(60.0);
+        app.insert_resource(HairDefault(HairWetting { sliding: 0.0, ..default() }));
+        let (_, entity) = one_strand(&mut app, 0.24, 8, Vec3::X);
+        let above = Vec3::new(0.03 * at, 0.004, 0.0);
+        let mut drop = Droplet::new(above, 4e-9).unwrap();
+        drop.velocity = Vec3::NEG_Y;
+        app.world_mut().spawn(drop);
+        run(&mut app, 0.2);
+        let film: f64 = app.world().get::<Moisture>(entity).unwrap().film().iter().sum();
+        assert!(film > 1e-10, "at {at}: {film} m³");
+    }
+}
+
 #[test]
 fn droplets_in_another_order_give_the_same_sums() {
     let total = |reverse: bool| {

@@ -1,5 +1,7 @@
 //! Caches of files.
 
+#[cfg(feature = "usd")]
+use super::usd;
 use super::{Groom, GroomCache, GroomCacheError, GroomFormat, GroomLosses, GroomSettings, alembic};
 use bevy::{
     asset::{AssetLoader, LoadContext, io::Reader},
@@ -10,7 +12,7 @@ use bevy::{
 const TIMES: u64 = 16;
 const ANYWAY: u64 = 1 << 20;
 
-/// Loads a [`GroomCache`] from `.abc` files, and files of one frame from all others that
+/// Loads a [`GroomCache`] from `.abc` and (feature `usd`) USD files, and files of one frame from all others that
 /// [`GroomLoader`](crate::authoring::groom::GroomLoader) knows, but glTF with buffers of its own.
 ///
 /// It registers no extension: name the type, as in `assets.load::<GroomCache>("run.abc")`.
@@ -44,7 +46,7 @@ impl AssetLoader for GroomCacheLoader {
 }
 
 impl GroomCache {
-    /// A cache of the bytes of an animated `.abc` file, and what was left out. Which strands stay and which end of each is
+    /// A cache of the bytes of an animated `.abc` or (feature `usd`) USD file, and what was left out. Which strands stay and which end of each is
     /// its root is decided in the first frame; nodes are not merged, so strands keep theirs in all. Any other file that
     /// [`Groom::from_file`] reads is a cache of a single frame.
     ///
@@ -56,14 +58,16 @@ impl GroomCache {
         settings: &GroomSettings,
     ) -> Result<(Self, GroomLosses), GroomCacheError> {
         let format = GroomFormat::of(file)?;
-        if format != GroomFormat::Alembic {
-            let (groom, losses) = Groom::from_file(file, settings)?;
-            let points = groom.points().to_vec();
-            return Ok((Self::new(groom, [(0.0, points)])?, losses));
-        }
-        let mut motion = alembic::Motion::of(file)?;
-        let frames = motion.frames();
-        let mut intake = alembic::intake(file)?;
+        let mut intake = match format {
+            GroomFormat::Alembic => alembic::intake(file)?,
+            #[cfg(feature = "usd")]
+            GroomFormat::Usd => usd::intake(file)?,
+            _ => {
+                let (groom, losses) = Groom::from_file(file, settings)?;
+                let points = groom.points().to_vec();
+                return Ok((Self::new(groom, [(0.0, points)])?, losses));
+            }
+        };
         intake.losses.unread_samples = default();
         settings.choose(&mut intake)?;
         // Without merging, which would go by the frame.
@@ -72,14 +76,13 @@ impl GroomCache {
         let groom = place(intake.groom.clone())?;
         let nodes = groom.points().len();
         let most = (file.len() as u64).saturating_mul(TIMES).saturating_add(ANYWAY);
-        if frames.saturating_mul(12 * nodes as u64) > most {
-            let (frames, most) = (frames as usize, (most >> 20) as usize);
-            return Err(GroomCacheError::TooLarge { frames, nodes, most });
-        }
-        let mut all = Vec::with_capacity(frames as usize);
-        for frame in 0..frames {
-            let (time, raw) = motion.frame(frame)?;
-            let frame = frame as usize;
+        let mut frames = Vec::new();
+        let take = |count: u64, time, raw: Groom| {
+            let frame = frames.len();
+            if count.saturating_mul(12 * nodes as u64) > most {
+                let (frames, most) = (count as usize, (most >> 20) as usize);
+                return Err(GroomCacheError::TooLarge { frames, nodes, most });
+            }
             if raw.len() != intake.all() {
                 let (what, found, expected) = ("strands", raw.len(), intake.all());
                 return Err(GroomCacheError::Differs { frame, what, found, expected });
@@ -88,8 +91,14 @@ impl GroomCache {
             if let Some(node) = raw.points().iter().position(|p| !p.is_finite()) {
                 return Err(GroomCacheError::NonFinite { frame, node });
             }
-            all.push((time, place(raw)?.points().to_vec()));
+            frames.push((time, place(raw)?.points().to_vec()));
+            Ok(())
+        };
+        match format {
+            #[cfg(feature = "usd")]
+            GroomFormat::Usd => usd::each_frame(file, take)?,
+            _ => alembic::each_frame(file, take)?,
         }
-        Ok((Self::new(groom, all)?, intake.losses))
+        Ok((Self::new(groom, frames)?, intake.losses))
     }
 }

@@ -10,13 +10,13 @@ pub(crate) const LIGHTS: usize = 4;
 /// The lights that shine.
 #[derive(SystemParam)]
 pub(crate) struct BrightLights<'w, 's> {
-    suns: Query<'w, 's, (&'static DirectionalLight, Seen)>,
-    spots: Query<'w, 's, (&'static SpotLight, Seen)>,
-    points: Query<'w, 's, (&'static PointLight, Seen)>,
-    panels: Query<'w, 's, (&'static RectLight, Seen)>,
+    suns: Query<'w, 's, (&'static DirectionalLight, Seen<'static>)>,
+    spots: Query<'w, 's, (&'static SpotLight, Seen<'static>)>,
+    points: Query<'w, 's, (&'static PointLight, Seen<'static>)>,
+    panels: Query<'w, 's, (&'static RectLight, Seen<'static>)>,
 }
 
-type Seen = (&'static GlobalTransform, &'static InheritedVisibility, Option<&'static RenderLayers>);
+type Seen<'a> = (&'a GlobalTransform, &'a InheritedVisibility, Option<&'a RenderLayers>);
 
 /// A light and how strongly it shines on a hair (lx).
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,9 +31,8 @@ impl BrightLights<'_, '_> {
     /// the world's frame: their place and 1, or the way to them and 0. As many as there are, the rest is zero.
     pub(crate) fn at(&self, center: Vec3, radius: f32, layers: &RenderLayers) -> [Vec4; LIGHTS] {
         // Bevy asks for the layers of a camera, not of what it sees.
-        type Of<'a> = (&'a GlobalTransform, &'a InheritedVisibility, Option<&'a RenderLayers>);
-        let shines = |of: Of| of.1.get() && of.2.unwrap_or_default().intersects(layers);
-        let local = |of: Of, intensity, range| {
+        let shines = |of: Seen| of.1.get() && of.2.unwrap_or_default().intersects(layers);
+        let local = |of: Seen, intensity, range| {
             let from = of.0.translation();
             let away = from.distance(center);
             let reaches = shines(of) && away - radius < range;

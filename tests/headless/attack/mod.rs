@@ -155,6 +155,26 @@ fn a_frozen_strand_that_is_written_into_is_rebuilt() {
     }
 }
 
+/// Each push would be added to the one before, as no step takes them.
+#[test]
+fn droplets_wet_a_frozen_strand_and_do_not_push_it() {
+    let mut app = test_app(60.0);
+    let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+    let small = LodLevel { below: 10.0, strands: 0.0, ..default() };
+    app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![small], ..default() });
+    run(&mut app, 0.1);
+    assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
+    let before = strand(&app, id).velocities().to_vec();
+    // Beside a node, which it pulls, and above an edge, on which it lands.
+    let places = strand(&app, id).positions();
+    for at in [places[4] + Vec3::Z * 0.003, places[8].lerp(places[7], 0.3) + Vec3::Y * 0.02] {
+        app.world_mut().spawn(Droplet::new(at, 4e-9).unwrap());
+    }
+    run(&mut app, 0.5);
+    assert!(app.world().get::<Moisture>(id).unwrap().volume() > 1e-10, "it is wet");
+    assert_eq!(strand(&app, id).velocities(), before);
+}
+
 /// Pops the last item of a list in a component's private part.
 fn pop<C: Component<Mutability = bevy::ecs::component::Mutable> + Reflect>(
     app: &mut App,

@@ -34,7 +34,7 @@ mod write;
 pub use write::{write, write_cache};
 
 use super::{
-    Groom, GroomFileError, GroomLosses,
+    Groom, GroomCacheError, GroomFileError, GroomLosses,
     bytes::value,
     curve_sets::{
         Attributes, COLOR, CurveSet, CurveSets, Curves, DAMPING, GROUP, GROUP_NAME, GUIDE, Kind,
@@ -77,10 +77,21 @@ pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     Ok(Reading::of(&archive, Read::All)?.sets.finish()?)
 }
 
-/// The nodes of all curves of a file at the times of its samples (s), whatever numbers they are.
-pub(super) struct Motion<'a> {
-    archive: Ogawa<'a>,
-    moments: Moments,
+/// Calls `take` for each sample of what moves nodes: with the count of all, the time (s), and the groom without
+/// anything but nodes, whatever numbers they are.
+pub(super) fn each_frame(
+    file: &[u8],
+    mut take: impl FnMut(u64, f64, Groom) -> Result<(), GroomCacheError>,
+) -> Result<(), GroomCacheError> {
+    let mut archive = Ogawa::open(file)?;
+    let Moments { count, times } = Reading::of(&archive, Read::Nodes)?.moments;
+    for sample in 0..count {
+        archive.sample = sample;
+        archive.look_again();
+        let time = if count == 1 { 0.0 } else { archive.time(times, sample)? };
+        take(count, time, Reading::of(&archive, Read::Nodes)?.sets.nodes())?;
+    }
+    Ok(())
 }
 
 /// When nodes move.
@@ -89,29 +100,6 @@ struct Moments {
     count: u64,
     /// By their [kind](Property::times).
     times: u64,
-}
-
-impl<'a> Motion<'a> {
-    pub(super) fn of(file: &'a [u8]) -> Result<Self, GroomFileError> {
-        let archive = Ogawa::open(file)?;
-        let moments = Reading::of(&archive, Read::Nodes)?.moments;
-        Ok(Self { archive, moments })
-    }
-
-    pub(super) fn frames(&self) -> u64 {
-        self.moments.count
-    }
-
-    /// Of a frame the time, and the groom without anything but nodes.
-    pub(super) fn frame(&mut self, frame: u64) -> Result<(f64, Groom), GroomFileError> {
-        self.archive.sample = frame;
-        self.archive.look_again();
-        let time = match self.moments.count {
-            1 => 0.0,
-            _ => self.archive.time(self.moments.times, frame)?,
-        };
-        Ok((time, Reading::of(&self.archive, Read::Nodes)?.sets.nodes()))
-    }
 }
 
 /// An object that others are in.

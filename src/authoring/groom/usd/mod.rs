@@ -1,7 +1,7 @@
 //! USD files with curves, read: `.usda`, `.usdc`, `.usdz` (feature `usd`).
 //!
 //! All curve sets of a stage become one groom, in the order of the prims and with the transforms above them
-//! applied; the earliest sample of what is animated counts. The file says its unit and axis: `metersPerUnit` and
+//! applied; the earliest sample of what is animated counts, and a [`GroomCache`](super::GroomCache) has all. The file says its unit and axis: `metersPerUnit` and
 //! `upAxis`, without which USD takes centimetres and Y.
 //!
 //! | curves | become |
@@ -36,7 +36,7 @@ mod transform;
 #[cfg(test)]
 mod tests;
 
-use super::{Groom, GroomFileError, GroomLosses, UpAxis, intake::Intake};
+use super::{Groom, GroomCacheError, GroomFileError, GroomLosses, UpAxis, intake::Intake};
 use error::{failed, wrong};
 use files::Files;
 use openusd::usd::Stage;
@@ -76,7 +76,7 @@ pub fn read(file: &[u8]) -> Result<(Groom, GroomLosses), GroomFileError> {
 pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     let ((unit, up), sets) = with_scene(file, |mut scene| {
         scene.walk()?;
-        Ok((scene.unit_and_up()?, scene.sets))
+        Ok::<_, GroomFileError>((scene.unit_and_up()?, scene.sets))
     })?;
     if sets.is_empty() {
         let found = format!("without curves ({})", sets.losses);
@@ -88,16 +88,33 @@ pub(super) fn intake(file: &[u8]) -> Result<Intake, GroomFileError> {
     Ok(intake)
 }
 
+/// Calls `take` for each time at which curves have samples of points or transforms: with the count of all, the
+/// time (s), and the groom without anything but nodes, whatever numbers they are.
+pub(super) fn each_frame(
+    file: &[u8],
+    mut take: impl FnMut(u64, f64, Groom) -> Result<(), GroomCacheError>,
+) -> Result<(), GroomCacheError> {
+    with_scene(file, |mut scene| {
+        scene.walk()?;
+        let (times, rate) = (scene.times()?, scene.rate()?);
+        for time in &times {
+            let seconds = if time.is_earliest_time() { 0.0 } else { time.value() / rate };
+            take(times.len() as u64, seconds, scene.nodes(*time)?)?;
+        }
+        Ok(())
+    })
+}
+
 /// Metres per unit and the axis that is up, as far as the file says.
 pub(super) fn unit_and_up(file: &[u8]) -> Result<(Option<f32>, Option<UpAxis>), GroomFileError> {
     with_scene(file, |scene| scene.unit_and_up())
 }
 
 /// Opens a file that does not claim what it does not have.
-fn with_scene<T>(
+fn with_scene<T, E: From<GroomFileError>>(
     file: &[u8],
-    read: impl FnOnce(Scene) -> Result<T, GroomFileError>,
-) -> Result<T, GroomFileError> {
+    read: impl FnOnce(Scene) -> Result<T, E>,
+) -> Result<T, E> {
     let files = Files::of(file)?;
     files.all.iter().try_for_each(|(_, layer)| claims::check(layer))?;
     // What the check does not know of may panic in the library.
@@ -109,6 +126,6 @@ fn with_scene<T>(
     done.unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or(panic.downcast_ref::<&str>().copied());
-        Err(failed(text.unwrap_or("a panic").to_owned()))
+        Err(failed(text.unwrap_or("a panic").to_owned()).into())
     })
 }

@@ -6,7 +6,7 @@ use super::{
     transform::{self, Wrong},
 };
 use crate::authoring::groom::{
-    GroomFileError, UpAxis,
+    Groom, GroomFileError, UpAxis,
     curve_sets::{
         Attributes, COLOR, CurveSet, CurveSets, Curves, DAMPING, GROUP, GROUP_NAME, GUIDE, Kind,
         Knots, Numbers, Param, ROOT_UV, STIFFNESS, WIDTH,
@@ -72,11 +72,23 @@ const NOTES: [&str; 4] =
 
 pub struct Scene<'a> {
     stage: &'a Stage,
+    bytes: usize,
     pub sets: CurveSets,
+    read: Read,
+    /// The prims of curves that were gathered.
+    drawn: Vec<Path>,
     /// How many prims there may be.
     limit: usize,
     /// Blender writes particle hair as B-splines whose points lie on the strands.
     is_of_blender: bool,
+}
+
+/// How much of curves is read, and of when.
+#[derive(Clone, Copy)]
+enum Read {
+    /// All, of the earliest time.
+    All,
+    Nodes(TimeCode),
 }
 
 /// A prim that others are in.
@@ -93,6 +105,19 @@ struct Primvar {
     indices: Option<Array>,
 }
 
+/// What a set of curves can do without.
+#[derive(Default)]
+struct Primvars {
+    widths: Option<Primvar>,
+    colors: Option<Primvar>,
+    uvs: Option<Primvar>,
+    guides: Option<Primvar>,
+    stiffness: Option<Primvar>,
+    damping: Option<Primvar>,
+    groups: Option<Primvar>,
+    group_names: Vec<String>,
+}
+
 impl From<Wrong> for GroomFileError {
     fn from(Wrong { name, found, expected }: Wrong) -> Self {
         wrong(name, found, expected, EXPORT_AGAIN)
@@ -107,7 +132,8 @@ fn library<T>(result: Result<T, impl Display>) -> Result<T, GroomFileError> {
 impl<'a> Scene<'a> {
     pub fn of(stage: &'a Stage, bytes: usize) -> Result<Self, GroomFileError> {
         let (limit, sets) = (PRIMS + bytes / BYTES_PER_PRIM, CurveSets::of(bytes));
-        let mut scene = Self { stage, sets, limit, is_of_blender: false };
+        let (read, drawn, is_of_blender) = (Read::All, Vec::new(), false);
+        let mut scene = Self { stage, bytes, sets, read, drawn, limit, is_of_blender };
         let by = scene.metadata("documentation")?.map(texts).unwrap_or_default();
         scene.is_of_blender = by.iter().any(|text| text.starts_with("Blender"));
         Ok(scene)
@@ -134,6 +160,49 @@ impl<'a> Scene<'a> {
             Some(other) => return Err(wrong("upAxis", cut(other), "Y or Z", EXPORT_AGAIN)),
         };
         Ok((unit, up))
+    }
+
+    /// Time codes a second.
+    pub fn rate(&self) -> Result<f64, GroomFileError> {
+        let rate = self.stage.time_codes_per_second();
+        if (1e-6..=1e9).contains(&rate) {
+            return Ok(rate);
+        }
+        Err(wrong("timeCodesPerSecond", rate, "a number of 1e-6 to 1e9", "correct it by usdedit"))
+    }
+
+    /// The times (in time codes) at which curves that are drawn have samples of points or transforms, in order;
+    /// the earliest time, if there are none. For what [`walk`](Self::walk) has visited.
+    pub fn times(&self) -> Result<Vec<TimeCode>, GroomFileError> {
+        let (mut times, mut seen) = (Vec::new(), HashSet::<String>::default());
+        let mut add = |prim: &Prim, name: &str| {
+            times.extend(library(prim.attribute(name).time_sample_times())?);
+            Ok::<_, GroomFileError>(())
+        };
+        for path in &self.drawn {
+            add(&self.stage.prim(path.clone()), "points")?;
+            // Of what is above a prim that was seen, all is known.
+            let mut above = Some(path.clone());
+            while let Some(path) = above.take_if(|path| seen.insert(path.to_string())) {
+                let prim = self.stage.prim(path.clone());
+                for name in self.value(&prim, transform::ORDER)?.map(texts).unwrap_or_default() {
+                    add(&prim, name.strip_prefix(transform::INVERTED).unwrap_or(&name))?;
+                }
+                above = path.parent();
+            }
+        }
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let times: Vec<TimeCode> = times.into_iter().map(TimeCode::from).collect();
+        Ok(if times.is_empty() { vec![TimeCode::EARLIEST] } else { times })
+    }
+
+    /// The curves at a time, of which nothing but the nodes are known; as many at any, if they are the same.
+    pub fn nodes(&mut self, at: TimeCode) -> Result<Groom, GroomFileError> {
+        (self.sets, self.read) = (CurveSets::of(self.bytes), Read::Nodes(at));
+        self.drawn.clear();
+        self.walk()?;
+        Ok(core::mem::replace(&mut self.sets, CurveSets::of(0)).nodes())
     }
 
     /// Gathers the curves of all prims.
@@ -206,7 +275,7 @@ impl<'a> Scene<'a> {
             at.hidden = at.hidden.or(Some("of purpose guide"));
         }
         let order = self.value(prim, transform::ORDER)?.map(texts).unwrap_or_default();
-        at.space = transform::space_of(at.space, &order, |name| self.value(prim, name))
+        at.space = transform::space_of(at.space, &order, |name| self.moving(prim, name))
             .map_err(|error| in_prim(error, &at.path))?;
         Ok(())
     }
@@ -214,6 +283,13 @@ impl<'a> Scene<'a> {
     /// The earliest value of an attribute.
     fn value(&self, prim: &Prim, name: &str) -> Result<Option<Value>, GroomFileError> {
         let value = library(prim.attribute(name).get_at::<Value>(TimeCode::EARLIEST))?;
+        Ok(value.filter(|value| !matches!(value, Value::None | Value::ValueBlock)))
+    }
+
+    /// The value of an attribute that moves nodes, at the time that is read.
+    fn moving(&self, prim: &Prim, name: &str) -> Result<Option<Value>, GroomFileError> {
+        let Read::Nodes(time) = self.read else { return self.value(prim, name) };
+        let value = library(prim.attribute(name).get_at::<Value>(time))?;
         Ok(value.filter(|value| !matches!(value, Value::None | Value::ValueBlock)))
     }
 
@@ -246,7 +322,7 @@ impl<'a> Scene<'a> {
             self.sets.losses.hidden_curves.add(GroomPlace::Part(format!("{path}, {why}")));
             return Ok(());
         }
-        let points = self.array(prim, "points")?;
+        let points = self.moving(prim, "points")?.and_then(Array::of);
         let counts = self.array(prim, "curveVertexCounts")?;
         let (Some(points), Some(counts)) = (points, counts) else {
             self.sets.losses.empty_curves.add(place());
@@ -262,6 +338,7 @@ impl<'a> Scene<'a> {
         }
         let (kind, is_even) = self.kind_of(prim, kind, path)?;
         let curves = self.curves_of(kind, &points, &counts, path)?;
+        self.drawn.push(at.path.clone());
         let samples = library(prim.attribute("points").num_time_samples())?;
         if let Some(more @ 1..) = samples.checked_sub(1) {
             self.sets.losses.unread_samples.add_many(more, place());
@@ -269,33 +346,14 @@ impl<'a> Scene<'a> {
         if self.token(prim, "wrap")?.as_deref() == Some("periodic") {
             self.sets.losses.opened_loops.add_many(curves.len(), place());
         }
-        let widths = self.primvar(prim, &[WIDTH, "widths"])?;
-        let colors = self.primvar(prim, &[COLOR, "displayColor"])?;
-        // One for all is what a viewport shows, not what somebody has painted.
-        let colors = colors.filter(|colors| {
-            let found = colors
-                .indices
-                .as_ref()
-                .map_or((&colors.array).len() / colors.array.each, |i| i.len());
-            !colors.name.ends_with("displayColor") || found > 1
-        });
-        let uvs = self.primvar(prim, &[ROOT_UV, "surface_uv_coordinate", "st"])?;
-        let guides = self.primvar(prim, &[GUIDE])?;
-        let stiffness = self.primvar(prim, &[STIFFNESS])?;
-        let damping = self.primvar(prim, &[DAMPING])?;
-        let groups = self.primvar(prim, &[GROUP])?;
-        let group_names = self.group_names(prim)?;
-        let attributes = Attributes {
-            widths: self.param(&widths, 1, &curves, path),
-            colors: self.param(&colors, 3, &curves, path),
-            uvs: self.param(&uvs, 2, &curves, path),
-            guides: self.param(&guides, 1, &curves, path),
-            stiffness: self.param(&stiffness, 1, &curves, path),
-            damping: self.param(&damping, 1, &curves, path),
-            groups: self.param(&groups, 1, &curves, path),
-            group_names: group_names.iter().map(String::as_str).collect(),
+        let primvars = match self.read {
+            Read::All => self.primvars(prim)?,
+            Read::Nodes(_) => Primvars::default(),
         };
-        self.unread(prim, path)?;
+        let attributes = self.attributes(&primvars, &curves, path);
+        if matches!(self.read, Read::All) {
+            self.unread(prim, path)?;
+        }
         let weights = self.array(prim, "pointWeights")?;
         let orders = self.array(prim, "order")?;
         let knots = self.array(prim, "knots")?;
@@ -314,6 +372,46 @@ impl<'a> Scene<'a> {
             path,
         };
         Ok(self.sets.add(&set, &attributes)?)
+    }
+
+    fn primvars(&self, prim: &Prim) -> Result<Primvars, GroomFileError> {
+        let colors = self.primvar(prim, &[COLOR, "displayColor"])?;
+        // One for all is what a viewport shows, not what somebody has painted.
+        let colors = colors.filter(|colors| {
+            let found = colors
+                .indices
+                .as_ref()
+                .map_or((&colors.array).len() / colors.array.each, |i| i.len());
+            !colors.name.ends_with("displayColor") || found > 1
+        });
+        Ok(Primvars {
+            widths: self.primvar(prim, &[WIDTH, "widths"])?,
+            colors,
+            uvs: self.primvar(prim, &[ROOT_UV, "surface_uv_coordinate", "st"])?,
+            guides: self.primvar(prim, &[GUIDE])?,
+            stiffness: self.primvar(prim, &[STIFFNESS])?,
+            damping: self.primvar(prim, &[DAMPING])?,
+            groups: self.primvar(prim, &[GROUP])?,
+            group_names: self.group_names(prim)?,
+        })
+    }
+
+    fn attributes<'v>(
+        &mut self,
+        primvars: &'v Primvars,
+        curves: &Curves,
+        path: &str,
+    ) -> Attributes<'v, &'v Array> {
+        Attributes {
+            widths: self.param(&primvars.widths, 1, curves, path),
+            colors: self.param(&primvars.colors, 3, curves, path),
+            uvs: self.param(&primvars.uvs, 2, curves, path),
+            guides: self.param(&primvars.guides, 1, curves, path),
+            stiffness: self.param(&primvars.stiffness, 1, curves, path),
+            damping: self.param(&primvars.damping, 1, curves, path),
+            groups: self.param(&primvars.groups, 1, curves, path),
+            group_names: primvars.group_names.iter().map(String::as_str).collect(),
+        }
     }
 
     /// The curves of a set, whose counts fit its points.

@@ -1,7 +1,7 @@
 //! Small stages as text: bases, attributes, transforms, and everything that can be wrong.
 
 use super::*;
-use crate::authoring::groom::{GroomError, GroomFormat, GroomSettings, UpAxis};
+use crate::authoring::groom::{GroomCache, GroomError, GroomFormat, GroomSettings, UpAxis};
 use bevy::prelude::*;
 use openusd::{usda, usdc, usdz};
 use std::io::Cursor;
@@ -314,6 +314,71 @@ fn of_samples_the_earliest_counts() {
     assert_eq!(losses.unread_samples.count, 1);
 }
 
+/// A strand whose points have samples at 0 and 2 and which moves at 1 and 3, below a prim that moves at 1 and 2.
+fn moving(rate: &str, points: &str) -> Vec<u8> {
+    file(&format!(
+        "(\nmetersPerUnit = 1\nupAxis = \"Y\"\n{rate}\n)\n\
+         def Xform \"Head\"\n{{\ndouble3 xformOp:translate.timeSamples = {{ 1: (0, 0, 0), 2: (0, 0, 4) }}\n\
+         uniform token[] xformOpOrder = [\"xformOp:translate\"]\n\
+         def BasisCurves \"Hair\"\n{{\n{LINEAR}int[] curveVertexCounts = [2]\n{points}\
+         double3 xformOp:translate:a.timeSamples = {{ 1: (0, 0, 0), 3: (8, 0, 0) }}\n\
+         uniform token[] xformOpOrder = [\"xformOp:translate:a\"]\n}}\n\
+         def Camera \"Eye\"\n{{\ndouble3 xformOp:translate.timeSamples = {{ 7: (0, 0, 0), 9: (0, 0, 1) }}\n\
+         uniform token[] xformOpOrder = [\"xformOp:translate\"]\n}}\n}}\n"
+    ))
+}
+
+const BENDING: &str = "point3f[] points.timeSamples = { 0: [(0, 0, 0), (0, 1, 0)], \
+                       2: [(0, 0, 0), (0, 1, 2)], }\n";
+
+#[test]
+fn caches_have_a_frame_at_each_time_at_which_nodes_have_samples() {
+    let text = moving("timeCodesPerSecond = 10", BENDING);
+    for whole in [text.clone(), binary(&text), package(&[("a.usdc", &binary(&text))])] {
+        let (cache, losses) = GroomCache::from_file(&whole, &GroomSettings::default()).unwrap();
+        // The camera's are not among them.
+        for (found, expected) in cache.times().iter().zip([0.0, 0.1, 0.2, 0.3]) {
+            assert!((found - expected).abs() < 1e-6, "{:?}", cache.times());
+        }
+        assert_eq!(cache.len(), 4);
+        let nodes = |frame| cache.frame(frame).to_vec();
+        assert_eq!(nodes(0), [Vec3::ZERO, Vec3::Y]);
+        assert_eq!(nodes(1), [Vec3::ZERO, Vec3::new(0.0, 1.0, 1.0)], "blended");
+        assert_eq!(nodes(2), [Vec3::new(4.0, 0.0, 4.0), Vec3::new(4.0, 1.0, 6.0)]);
+        assert_eq!(nodes(3), [Vec3::new(8.0, 0.0, 4.0), Vec3::new(8.0, 1.0, 6.0)]);
+        assert_eq!(losses.unread_samples.count, 0);
+        assert_eq!(cache.groom().points(), nodes(0));
+    }
+    // Without a rate it is 24 a second.
+    let (cache, _) = GroomCache::from_file(&moving("", BENDING), &default()).unwrap();
+    assert!((cache.duration() - 0.125).abs() < 1e-6);
+    // What does not move is one frame.
+    let (still, _) = GroomCache::from_file(&file(&hair(LINEAR)), &default()).unwrap();
+    assert_eq!(still.times(), [0.0]);
+}
+
+#[test]
+fn motion_that_cannot_be_is_refused() {
+    let error = |file: &[u8]| GroomCache::from_file(file, &default()).unwrap_err().to_string();
+    let more = "point3f[] points.timeSamples = { 0: [(0, 0, 0), (0, 1, 0)], \
+                2: [(0, 0, 0), (0, 1, 2), (0, 2, 2)], }\n";
+    let found = error(&moving("", more));
+    assert!(found.contains("curveVertexCounts") || found.contains("nodes"), "{found}");
+    let found = error(&moving("timeCodesPerSecond = 0", BENDING));
+    assert!(found.contains("timeCodesPerSecond: found 0, expected a number of"), "{found}");
+    // A strand of many nodes that its prim moves often.
+    let points: Vec<String> = (0..2000).map(|i| format!("(0, {i}, 0)")).collect();
+    let times: Vec<String> = (0..3000).map(|i| format!("{i}: (0, {i}, 0)")).collect();
+    let found = error(&file(&format!(
+        "def BasisCurves \"Hair\"\n{{\n{LINEAR}int[] curveVertexCounts = [2000]\n\
+         point3f[] points = [{}]\ndouble3 xformOp:translate.timeSamples = {{ {} }}\n\
+         uniform token[] xformOpOrder = [\"xformOp:translate\"]\n}}\n",
+        points.join(", "),
+        times.join(", ")
+    )));
+    assert!(found.contains("has 3000 frames of 2000 nodes, expected at most"), "{found}");
+}
+
 #[test]
 fn what_is_in_the_file_is_composed() {
     let class = hair(LINEAR).replace("def", "class").replace("\"Hair\"", "\"_lock\"");
@@ -434,6 +499,7 @@ fn broken_files_are_refused_or_read() {
     let xform = "def Xform \"Head\" (customData = { dictionary a = { int b = 1 } }\n\
                  prepend references = </Class>)\n{\n}\nclass \"Class\"\n{\n}\n";
     let text = file(&format!("{}{xform}", hair(&format!("{LINEAR}{more}"))));
+    let moves = moving("", BENDING);
     let mut state = 1u64;
     let mut random = |below: usize| {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -452,6 +518,19 @@ fn broken_files_are_refused_or_read() {
             }
             if let Ok((groom, _)) = read(&file) {
                 assert!(groom.points().iter().all(|p| p.is_finite()));
+            }
+        }
+    }
+    for whole in [moves.clone(), binary(&moves)] {
+        for _ in 0..300 {
+            let mut file = whole.clone();
+            for _ in 0..=random(4) {
+                let at = random(file.len());
+                file[at] = random(256) as u8;
+            }
+            if let Ok((cache, _)) = GroomCache::from_file(&file, &default()) {
+                let frames = (0..cache.len()).flat_map(|frame| cache.frame(frame));
+                assert!(frames.clone().count() > 0 && frames.clone().all(|p| p.is_finite()));
             }
         }
     }

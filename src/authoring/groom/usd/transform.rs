@@ -7,7 +7,7 @@ use openusd::sdf::Value;
 
 pub const ORDER: &str = "xformOpOrder";
 const RESET: &str = "!resetXformStack!";
-const INVERTED: &str = "!invert!";
+pub const INVERTED: &str = "!invert!";
 
 /// The space of a prim, by the names of its operations, outermost first, and their values.
 ///
