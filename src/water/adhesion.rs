@@ -354,7 +354,8 @@ impl ContactParams<'_> {
             let touch = seen.touch(self.wetting.lock_radius());
             let lengths = strand_lane.lengths;
             for (node, place) in strand_lane.positions.iter().enumerate() {
-                let edges = &lengths[node.saturating_sub(1)..lengths.len().min(node + 1)];
+                let edges = node.saturating_sub(1)..lengths.len().min(node + 1);
+                let edges = lengths.get(edges).unwrap_or_default();
                 let near = edges.iter().fold(touch, |near, edge| near.max(MIDDLE * edge));
                 if place.distance_squared(seen.at) < near * near {
                     self.want(drop, strand, node, strand_lane.film, out);
