@@ -87,7 +87,7 @@ pub struct HairReport {
     /// The strand that has it.
     #[entities]
     pub worst_strand: Option<Entity>,
-    /// The fastest node (m/s in the world).
+    /// The fastest node (m/s, in the frame and units of its hair, as [`Strand::velocities`](crate::Strand::velocities)).
     pub fastest: f32,
 }
 

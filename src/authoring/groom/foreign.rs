@@ -79,7 +79,8 @@ pub(super) fn is_usd(file: &[u8]) -> bool {
         Some([&b"usd"[..], b"usda", b"usdc"].contains(&extension))
     };
     let is_package = file.starts_with(b"PK\x03\x04") && first() == Some(true);
-    file.starts_with(b"PXR-USDC") || file.starts_with(b"#usda") || is_package
+    let text = file.strip_prefix(b"\xef\xbb\xbf").unwrap_or(file);
+    file.starts_with(b"PXR-USDC") || text.starts_with(b"#usda") || is_package
 }
 
 /// Whether nothing is known about it.

@@ -56,6 +56,8 @@ impl HairRecipe {
     /// # Errors
     /// When it is no RON, or names a preset, component or field that there is not; with line and column.
     pub fn from_ron(file: &[u8], registry: &TypeRegistry) -> Result<Self, RecipeError> {
+        // Some editors begin a file with a mark.
+        let file = file.strip_prefix(b"\xef\xbb\xbf").unwrap_or(file);
         let mut file = ron::de::Deserializer::from_bytes(file)?;
         let recipe = RecipeOf(registry).deserialize(&mut file).map_err(|e| file.span_error(e))?;
         file.end().map_err(|e| file.span_error(e))?;

@@ -368,8 +368,10 @@ impl Strand {
     /// with real part ≥ 0. For an untwisted joint |Im Ω| = sin(θ/2), θ the turning angle.
     #[inline]
     pub fn darboux(&self, i: usize) -> Quat {
-        let before = if i == 0 { self.root_frame } else { self.orientations[i - 1] };
-        darboux(before, self.orientations[i])
+        // Of fewer orientations than edges, as an inspector may write them, those that are missing turn no joint.
+        let edge = |i: usize| self.orientations.get(i).copied().unwrap_or(Quat::IDENTITY);
+        let before = if i == 0 { self.root_frame } else { edge(i - 1) };
+        darboux(before, edge(i))
     }
 
     /// The largest |length/rest − 1| over the segments.

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 /// | [`Simulated`](Self::Simulated) | by the tick, here | by default | | everything |
 /// | [`Settling`](Self::Settling) | by the tick, and by more ticks ahead ([`SettleTick`](crate::SettleTick)) | [`Settling`] is inserted | it is at rest, and [`Settling`] is removed | everything in the tick; ahead of it no bonds, water and treatments. It is not drawn, and at each level of detail all its strands are simulated |
 /// | [`Frozen`](Self::Frozen) | not at all: they keep their shape on the head | a level without simulated strands ([`LodLevel::strands`](crate::LodLevel::strands)) | another level | bonds, water and treatments |
-/// | [`Played`](Self::Played) | by a recorded or animated groom (`PlayGroomCache`, feature `groom`) | it is loaded | the component is removed | nothing: bonds, water and treatments wait |
+/// | [`Played`](Self::Played) | by a recorded or animated groom (`PlayGroomCache`, feature `groom`) | it is loaded | the component is removed | water, drying and treatments; not settling, and lakes only once it ends |
 /// | [`Asleep`](Self::Asleep) | not at all: all its strands sleep ([`SleepSettings`](crate::SleepSettings)) | the last of them falls asleep | one wakes | what wakes it; treatments and water |
 /// | [`Gpu`](Self::Gpu) | by compute shaders | it is handed over | it has come back | what a shader knows of; no system here touches its strands |
 /// | [`AsleepOnGpu`](Self::AsleepOnGpu) | not at all, on the GPU | the GPU reports that all are still | something disturbs it | what wakes it |

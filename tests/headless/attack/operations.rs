@@ -156,8 +156,11 @@ pub fn not_finite(app: &mut App) -> Option<String> {
             // Entities of other crates are left unchanged.
             let is_lost = world.get::<StrandOf>(*entity).is_none_or(|of| !hairs.contains(&of.0))
                 && world.get::<Strand>(*entity).is_some();
+            // Of an entity that has ceased to be a strand nothing is made again.
+            let is_left = name == "RestShape" && world.get::<Strand>(*entity).is_none();
             let is_stub = world.get::<Strand>(*entity).is_some_and(|strand| strand.nodes() < 2);
             if !is_lost
+                && !is_left
                 && !is_stub
                 && let Some(value) = component.reflect(world.entity(*entity))
                 && let Some(found) = search(value.as_partial_reflect())

@@ -48,7 +48,7 @@ pub enum GroomCacheError {
     /// More frames than memory should hold.
     #[error(
         "the cache has {frames} frames of {nodes} nodes, expected at most {most} MB of 12 bytes a node: record or export \
-         fewer strands or frames"
+         fewer strands or frames; of hair that only moves as a whole export one frame, and move its entity"
     )]
     TooLarge {
         /// How many frames it has.

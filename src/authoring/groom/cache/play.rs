@@ -26,9 +26,9 @@ use core::ops::Range;
 
 /// Plays a [`GroomCache`] on a hair: its strands are where the cache says, in the hair's frame, in place of being simulated.
 /// On the entity of the [`Hair`]; it is simulated until the asset is there, and again, with the velocities that it has by
-/// then, once this is removed. Meanwhile bonds, water and treatments wait, as does settling, and it is not on the GPU; strands
-/// that follow others at a [level of detail](crate::HairLod), and strands that are drawn between others, follow those that
-/// are played. [`MotionOwner::Played`](crate::MotionOwner::Played) says that it is on.
+/// then, once this is removed. Meanwhile water, drying and treatments act, which changes what its bonds remember and not how it
+/// is drawn; settling and lakes wait, and it is not on the GPU; strands that follow others at a
+/// [level of detail](crate::HairLod), and strands that are drawn between others, follow those that are played. [`MotionOwner::Played`](crate::MotionOwner::Played) says that it is on.
 ///
 /// A hair of as many strands as the cache, with as many nodes each, plays node by node; of a recorded hair that is the order
 /// of its strands. Else each strand plays the one of the cache whose root was nearest in the first frame, its nodes as far along

@@ -115,6 +115,8 @@ fn with_scene<T, E: From<GroomFileError>>(
     file: &[u8],
     read: impl FnOnce(Scene) -> Result<T, E>,
 ) -> Result<T, E> {
+    // Some editors begin a file with a mark.
+    let file = file.strip_prefix(b"\xef\xbb\xbf").unwrap_or(file);
     let files = Files::of(file)?;
     files.all.iter().try_for_each(|(_, layer)| claims::check(layer))?;
     // What the check does not know of may panic in the library.

@@ -176,7 +176,7 @@ impl<'a> Scene<'a> {
     pub fn times(&self) -> Result<Vec<TimeCode>, GroomFileError> {
         let (mut times, mut seen) = (Vec::new(), HashSet::<String>::default());
         let mut add = |prim: &Prim, name: &str| {
-            times.extend(library(prim.attribute(name).time_sample_times())?);
+            times.extend(samples_of(prim, name)?);
             Ok::<_, GroomFileError>(())
         };
         for path in &self.drawn {
@@ -201,7 +201,13 @@ impl<'a> Scene<'a> {
     pub fn nodes(&mut self, at: TimeCode) -> Result<Groom, GroomFileError> {
         (self.sets, self.read) = (CurveSets::of(self.bytes), Read::Nodes(at));
         self.drawn.clear();
-        self.walk()?;
+        self.walk().map_err(|error| match error {
+            GroomFileError::Usd { place, found, expected, hint } => {
+                let place = format!("{place} at time code {}", at.value());
+                GroomFileError::Usd { place, found, expected, hint }
+            }
+            other => other,
+        })?;
         Ok(core::mem::replace(&mut self.sets, CurveSets::of(0)).nodes())
     }
 
@@ -323,7 +329,7 @@ impl<'a> Scene<'a> {
             return Ok(());
         }
         let points = self.moving(prim, "points")?.and_then(Array::of);
-        let counts = self.array(prim, "curveVertexCounts")?;
+        let counts = self.moving(prim, "curveVertexCounts")?.and_then(Array::of);
         let (Some(points), Some(counts)) = (points, counts) else {
             self.sets.losses.empty_curves.add(place());
             return Ok(());
@@ -339,7 +345,7 @@ impl<'a> Scene<'a> {
         let (kind, is_even) = self.kind_of(prim, kind, path)?;
         let curves = self.curves_of(kind, &points, &counts, path)?;
         self.drawn.push(at.path.clone());
-        let samples = library(prim.attribute("points").num_time_samples())?;
+        let samples = samples_of(prim, "points")?.len();
         if let Some(more @ 1..) = samples.checked_sub(1) {
             self.sets.losses.unread_samples.add_many(more, place());
         }
@@ -535,6 +541,17 @@ impl<'a> Scene<'a> {
             self.sets.losses.unread_files.add(GroomPlace::Part(part));
         }
     }
+}
+
+/// The times of an attribute's samples, which have to ascend: the library looks for them so.
+fn samples_of(prim: &Prim, name: &str) -> Result<Vec<f64>, GroomFileError> {
+    let times = library(prim.attribute(name).time_sample_times())?;
+    let Some(pair) = times.windows(2).find(|pair| !matches!(pair, [a, b] if a < b)) else {
+        return Ok(times);
+    };
+    let place = format!("{}.{name}.timeSamples", cut(prim.path().to_string()));
+    let found = format!("{} after {}", pair[1], pair[0]);
+    Err(wrong(place, found, "times that ascend", "sort them, as usdcat does"))
 }
 
 /// The error with the prim that it is about.

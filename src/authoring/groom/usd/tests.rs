@@ -352,6 +352,14 @@ fn caches_have_a_frame_at_each_time_at_which_nodes_have_samples() {
     // Without a rate it is 24 a second.
     let (cache, _) = GroomCache::from_file(&moving("", BENDING), &default()).unwrap();
     assert!((cache.duration() - 0.125).abs() < 1e-6);
+    // Whole numbers of what is a float.
+    let turning = file(&format!(
+        "(\nmetersPerUnit = 1\nupAxis = \"Y\"\n)\ndef BasisCurves \"Hair\"\n{{\n{LINEAR}int[] curveVertexCounts = [2]\n\
+         point3f[] points = [(0, 0, 0), (0, 1, 0)]\nfloat xformOp:rotateZ.timeSamples = {{ 0: 0, 24: 90 }}\n\
+         uniform token[] xformOpOrder = [\"xformOp:rotateZ\"]\n}}\n"
+    ));
+    let (cache, _) = GroomCache::from_file(&turning, &default()).unwrap();
+    assert!(cache.frame(1)[1].distance(Vec3::NEG_X) < 1e-6, "{:?}", cache.frame(1));
     // What does not move is one frame.
     let (still, _) = GroomCache::from_file(&file(&hair(LINEAR)), &default()).unwrap();
     assert_eq!(still.times(), [0.0]);
@@ -364,6 +372,15 @@ fn motion_that_cannot_be_is_refused() {
                 2: [(0, 0, 0), (0, 1, 2), (0, 2, 2)], }\n";
     let found = error(&moving("", more));
     assert!(found.contains("curveVertexCounts") || found.contains("nodes"), "{found}");
+    // As many in the first frame, more in a later one.
+    let counts = "int[] curveVertexCounts.timeSamples = { 0: [2], 2: [3] }\n";
+    let text = String::from_utf8(moving("", more)).unwrap();
+    let found = error(text.replace("int[] curveVertexCounts = [2]\n", counts).as_bytes());
+    assert!(found.contains("frame 2 has 3 nodes, expected 2"), "{found}");
+    let unsorted = "point3f[] points.timeSamples = { 24: [(0, 0, 0), (0, 1, 0)], \
+                    0: [(0, 0, 0), (0, 1, 2)], }\n";
+    let found = error(&moving("", unsorted));
+    assert!(found.contains("points.timeSamples: found 0 after 24, expected times that"), "{found}");
     let found = error(&moving("timeCodesPerSecond = 0", BENDING));
     assert!(found.contains("timeCodesPerSecond: found 0, expected a number of"), "{found}");
     // A strand of many nodes that its prim moves often.
