@@ -407,12 +407,16 @@ impl Strand {
         self.tensions.fill(0.0);
     }
 
-    /// Adds a rigid motion: a velocity (m/s) at the origin, and a spin (rad/s).
+    /// Adds a rigid motion: a velocity (m/s) at the origin, and a spin (rad/s). One beyond all numbers is left out.
     pub(crate) fn add_motion(&mut self, velocity: Vec3, spin: Vec3) {
         for (v, p) in self.velocities.iter_mut().zip(&self.positions) {
-            *v += velocity + spin.cross(*p);
+            let moved = *v + (velocity + spin.cross(*p));
+            *v = if moved.is_finite() { moved } else { *v };
         }
-        self.angular_velocities.iter_mut().for_each(|v| *v += spin);
+        for v in &mut self.angular_velocities {
+            let turned = *v + spin;
+            *v = if turned.is_finite() { turned } else { *v };
+        }
     }
 
     /// Sets the strand to the shape given by a Darboux vector per joint, at rest, from its root on.

@@ -210,6 +210,11 @@ fn shape(
         }
         Some(_) => rest_shapes(level, frames(strand), joints, &key.influence, &mut rest.darboux),
     }
+    // Of a strand that is not finite, which its step mends.
+    if !rest.darboux.iter().map(|q| Vec4::from(*q)).sum::<Vec4>().is_finite() {
+        rest.darboux.fill(Quat::IDENTITY);
+        rest.closed = false;
+    }
     if is_other {
         (rest.key, rest.share) = (Some(*key), share);
         rest.softened.clone_from(&added_mass.softening);

@@ -69,9 +69,7 @@ pub(crate) fn sync_follower_sleep(
             if let Ok((_, guides)) = hairs.get(of.0) {
                 let (positions, velocities, _) = strand.bypass_change_detection().motion_parts();
                 for (v, p) in velocities.iter_mut().zip(positions) {
-                    // Of a head that came from beyond all numbers none is known.
-                    let velocity = guides.frame.velocity(*p, seconds);
-                    *v = if velocity.is_finite() { velocity } else { Vec3::ZERO };
+                    *v = guides.frame.velocity(*p, seconds);
                 }
             }
         }
