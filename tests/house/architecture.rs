@@ -376,7 +376,7 @@ fn no_file_is_too_long_to_be_understood() {
 /// its library believes them, and grooms that move, which are recorded, read, written and played, 55,130 before recipes,
 /// which hair follows as their files change, and damping and curl of single strands.
 /// A commit that raises it says why.
-const MOST_LINES: usize = 56_180;
+const MOST_LINES: usize = 56_345;
 
 #[test]
 fn the_crate_stays_small() {

@@ -46,7 +46,7 @@ impl Hairdo {
             .into_iter()
             .zip(holds)
             .filter_map(|(member, hold)| {
-                let strand = world.get::<Strand>(member)?;
+                let strand = &*world.get::<Strand>(member)?.whole();
                 let (bonds, water) = (world.get::<Bonds>(member), world.get::<Moisture>(member));
                 let cut = world.get::<CutStrand>(member).copied();
                 let cut = cut.filter(|cut| cut.fits(strand.nodes()));

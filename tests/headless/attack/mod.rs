@@ -9,7 +9,8 @@ use crate::common::*;
 use bevy::{prelude::*, reflect::ReflectMut};
 use bevy_keratin::{
     BondChanges, DropletRules, FaultKind, HairLod, HairSubsteps, InvalidValue, LodLevel,
-    MotionOwner, Shower, SoakHair, hair::strand::TickPose, keratin::bond::RestShape, prelude::*,
+    MotionOwner, Shower, SoakHair, SolverMethod, hair::strand::TickPose, keratin::bond::RestShape,
+    prelude::*,
 };
 use rand::{RngExt, SeedableRng, rngs::Xoshiro256PlusPlus};
 
@@ -152,6 +153,38 @@ fn a_frozen_strand_that_is_written_into_is_rebuilt() {
         run(&mut app, 0.1);
         assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
         assert!(strand(&app, id).is_finite() && strand(&app, id).peak_strain() < 0.01);
+    }
+}
+
+/// It may never be simulated again, to make another.
+#[test]
+fn no_rest_shape_is_kept_of_a_strand_that_is_not_finite() {
+    for method in [SolverMethod::Direct, SolverMethod::Sweeps] {
+        let mut app = test_app(60.0);
+        app.insert_resource(HairDefault(HairSolver { method, ..default() }));
+        let (_, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+        run(&mut app, 0.1);
+        app.world_mut().get_mut::<Strand>(id).unwrap().positions_mut()[5].y = f32::NAN;
+        app.update();
+        let rest = app.world().get::<RestShape>(id).unwrap();
+        assert!(rest.darboux.len() == 8 && rest.darboux.iter().all(|q| q.is_finite()), "{rest:?}");
+        run(&mut app, 0.1);
+        assert!(strand(&app, id).is_finite());
+    }
+}
+
+#[cfg(feature = "save")]
+#[test]
+fn a_hairdo_of_a_strand_whose_parts_do_not_fit_is_whole() {
+    for part in ["velocities", "positions", "orientations", "rest_lengths", "tensions"] {
+        let mut app = test_app(60.0);
+        let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
+        run(&mut app, 0.1);
+        pop::<Strand>(&mut app, id, part);
+        let hairdo = Hairdo::of(app.world(), hair).unwrap();
+        let strand = &hairdo.strands()[0];
+        assert_eq!(strand.positions().len(), strand.orientations().len() + 1, "{part}");
+        assert_eq!(Hairdo::from_bytes(&hairdo.to_bytes()), Ok(hairdo), "{part}");
     }
 }
 
