@@ -3,14 +3,15 @@
 use super::{AddedMass, MAX_SEGMENT, MIN_SEGMENT, Strand, StrandHistory};
 use crate::solver::rod::frame::parallel_transport;
 use bevy::prelude::*;
-use std::borrow::Cow;
 
 /// Rest length used where the stored one is invalid and cannot be measured (m).
 const UNKNOWN_LENGTH: f32 = 0.01;
 
 impl Strand {
     /// The strand as the next tick would make it, where its arrays do not fit each other.
-    pub(crate) fn whole(&self) -> Cow<'_, Self> {
+    #[cfg(feature = "save")]
+    pub(crate) fn whole(&self) -> std::borrow::Cow<'_, Self> {
+        use std::borrow::Cow;
         let [nodes, edges, lengths] =
             [self.positions.len(), self.orientations.len(), self.rest_lengths.len()];
         if edges == lengths && nodes.saturating_sub(1) == edges {
