@@ -60,8 +60,9 @@ impl Owners<'_, '_> {
     fn of(&self, strand: &StrandOf, sleep: &StrandSleep) -> Owner {
         match self.hairs.get(strand.0).copied().unwrap_or_default() {
             MotionOwner::Gpu | MotionOwner::AsleepOnGpu => Owner::Gpu,
-            MotionOwner::Frozen | MotionOwner::Played => Owner::Frozen,
+            MotionOwner::Frozen => Owner::Frozen,
             MotionOwner::Settling => Owner::Settling,
+            MotionOwner::Played if !sleep.is_follower() => Owner::Frozen,
             _ if sleep.is_follower() => Owner::Follower,
             _ if sleep.is_asleep() => Owner::Asleep,
             _ => Owner::Simulated,

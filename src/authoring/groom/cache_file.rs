@@ -46,8 +46,9 @@ impl AssetLoader for GroomCacheLoader {
 }
 
 impl GroomCache {
-    /// A cache of the bytes of an animated `.abc` or (feature `usd`) USD file, and what was left out. Which strands stay and which end of each is
-    /// its root is decided in the first frame; nodes are not merged, so strands keep theirs in all. Any other file that
+    /// A cache of the bytes of an animated `.abc` or (feature `usd`) USD file, and what was left out. Which strands stay
+    /// and which end of each is its root is decided in the first frame; nodes are not merged, so strands keep theirs in
+    /// all. Any other file that
     /// [`Groom::from_file`] reads is a cache of a single frame.
     ///
     /// # Errors

@@ -598,6 +598,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn motion_beyond_all_numbers_is_left_out() {
+        let mut strand = Strand::from_polyline(&[Vec3::ZERO, Vec3::X, Vec3::X * 2.0]).unwrap();
+        strand.add_motion(Vec3::Y, Vec3::Z);
+        let before = (strand.velocities.clone(), strand.angular_velocities.clone());
+        assert_eq!(before, (vec![Vec3::Y, Vec3::Y * 2.0, Vec3::Y * 3.0], vec![Vec3::Z; 2]));
+        strand.add_motion(Vec3::NAN, Vec3::splat(f32::INFINITY));
+        assert_eq!((strand.velocities, strand.angular_velocities), before);
+    }
+
+    #[test]
     fn bad_polylines_are_refused_with_a_reason() {
         let refuse = |points: &[Vec3]| Strand::from_polyline(points).unwrap_err();
         assert_eq!(refuse(&[]), StrandError::TooFewNodes { found: 0 });

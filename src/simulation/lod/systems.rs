@@ -21,7 +21,7 @@ use crate::{
         },
         worn,
     },
-    keratin::bond::{BondInfluence, Bonds, RestShape},
+    keratin::bond::{BondInfluence, Bonds},
     water::IsWet,
 };
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
@@ -77,14 +77,8 @@ struct Reported {
     left_out: bool,
 }
 
-type Rebuilt = (
-    Entity,
-    &'static StrandOf,
-    &'static mut Strand,
-    Option<&'static Bonds>,
-    Option<&'static mut RestShape>,
-    Has<KinematicStrand>,
-);
+type Rebuilt =
+    (Entity, &'static StrandOf, &'static mut Strand, Option<&'static Bonds>, Has<KinematicStrand>);
 
 /// A strand that is written into until it is not finite is put back by its next step. Those of which there is none, or none
 /// before their hair freezes, get the pose that their bonds remember.
@@ -97,7 +91,7 @@ fn rebuild_broken(
     let frozen = hairs.iter().filter(|(_, owner)| **owner == MotionOwner::Frozen);
     let newly: EntityHashSet =
         frozen.filter(|(_, owner)| owner.is_changed()).map(|(hair, _)| hair).collect();
-    for (entity, of, mut strand, bonds, rest, is_kinematic) in &mut strands {
+    for (entity, of, mut strand, bonds, is_kinematic) in &mut strands {
         if !strand.is_changed() && !newly.contains(&of.0) {
             continue;
         }
@@ -109,10 +103,6 @@ fn rebuild_broken(
         let joints = bonds.map_or(&[][..], |bonds| &bonds.joints);
         let shape = joints.iter().map(|joint| joint.relaxed(&influence));
         let fault = strand.bypass_change_detection().put_back(shape);
-        // It may have been made of the broken one, and is made again.
-        if let Some(mut rest) = rest {
-            *rest = default();
-        }
         faults.write_batch(fault.map(|fault| fault.of(entity)));
     }
 }

@@ -124,15 +124,20 @@ fn a_strand_whose_parts_do_not_fit_is_cut_once_it_is_repaired() {
     }
 }
 
+/// Gives a hair a level at which nothing simulates it, and runs for 0.1 s.
+fn freeze(app: &mut App, hair: Entity) {
+    let small = LodLevel { below: 10.0, strands: 0.0, ..default() };
+    app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![small], ..default() });
+    run(app, 0.1);
+    assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
+}
+
 /// Nothing simulates hair that is small on the screen, and so nothing else would notice.
 #[test]
 fn a_frozen_strand_that_is_written_into_is_rebuilt() {
     let mut app = test_app(60.0);
     let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
-    let small = LodLevel { below: 10.0, strands: 0.0, ..default() };
-    app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![small], ..default() });
-    run(&mut app, 0.1);
-    assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
+    freeze(&mut app, hair);
     for wrong in [f32::NAN, f32::NEG_INFINITY] {
         app.world_mut().get_mut::<Strand>(id).unwrap().positions_mut()[5].y = wrong;
         run(&mut app, 0.1);
@@ -148,10 +153,7 @@ fn a_frozen_strand_that_is_written_into_is_rebuilt() {
         run(&mut app, 0.1);
         assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Simulated));
         spoil(&mut app.world_mut().get_mut::<Strand>(id).unwrap());
-        let small = LodLevel { below: 10.0, strands: 0.0, ..default() };
-        app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![small], ..default() });
-        run(&mut app, 0.1);
-        assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
+        freeze(&mut app, hair);
         assert!(strand(&app, id).is_finite() && strand(&app, id).peak_strain() < 0.01);
     }
 }
@@ -193,10 +195,7 @@ fn a_hairdo_of_a_strand_whose_parts_do_not_fit_is_whole() {
 fn droplets_wet_a_frozen_strand_and_do_not_push_it() {
     let mut app = test_app(60.0);
     let (hair, id) = one_strand(&mut app, 0.24, 8, Vec3::X);
-    let small = LodLevel { below: 10.0, strands: 0.0, ..default() };
-    app.world_mut().entity_mut(hair).insert(HairLod { levels: vec![small], ..default() });
-    run(&mut app, 0.1);
-    assert_eq!(app.world().get::<MotionOwner>(hair), Some(&MotionOwner::Frozen));
+    freeze(&mut app, hair);
     let before = strand(&app, id).velocities().to_vec();
     // Beside a node, which it pulls, and above an edge, on which it lands.
     let places = strand(&app, id).positions();

@@ -3,7 +3,7 @@
 use crate::common::*;
 use bevy::{asset::AssetPlugin, prelude::*, time::TimeUpdateStrategy};
 use bevy_keratin::{
-    HairFault, MotionOwner, SleepCounts,
+    HairFault, HairLod, LodLevel, MotionOwner, SleepCounts,
     authoring::groom::{GroomCacheError, alembic},
     hair::strand::StrandHistory,
     prelude::*,
@@ -120,6 +120,22 @@ fn half_as_fast_between_frames_and_again_from_the_beginning() {
     assert!(worst(&begun, &places(&app, &strands)) < 1e-5);
     let history = app.world().get::<StrandHistory>(strands[0]).unwrap();
     assert_eq!(history.positions, strand(&app, strands[0]).positions());
+}
+
+#[test]
+fn followers_of_hair_that_is_played_are_reported() {
+    let mut app = app();
+    let (cache, _) = recorded(&mut app);
+    let (id, _) = play(&mut app, cache, PlayGroomCache { repeat: true, ..default() });
+    let level = LodLevel { below: 10.0, strands: 0.25, ..default() };
+    app.world_mut()
+        .entity_mut(id)
+        .insert((HairLod { levels: vec![level], ..default() }, HairReport::default()));
+    run(&mut app, 0.2);
+    let report = app.world().get::<HairReport>(id).unwrap();
+    let followers = app.world().get::<PresentLod>(id).unwrap().followers;
+    assert_eq!((report.owner, report.followers), (MotionOwner::Played, followers));
+    assert!(followers > 0, "{report:?}");
 }
 
 #[test]

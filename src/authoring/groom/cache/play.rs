@@ -28,7 +28,8 @@ use core::ops::Range;
 /// On the entity of the [`Hair`]; it is simulated until the asset is there, and again, with the velocities that it has by
 /// then, once this is removed. Meanwhile water, drying and treatments act, which changes what its bonds remember and not how it
 /// is drawn; settling and lakes wait, and it is not on the GPU; strands that follow others at a
-/// [level of detail](crate::HairLod), and strands that are drawn between others, follow those that are played. [`MotionOwner::Played`](crate::MotionOwner::Played) says that it is on.
+/// [level of detail](crate::HairLod), and strands that are drawn between others, follow those that are played.
+/// [`MotionOwner::Played`](crate::MotionOwner::Played) says that it is on.
 ///
 /// A hair of as many strands as the cache, with as many nodes each, plays node by node; of a recorded hair that is the order
 /// of its strands. Else each strand plays the one of the cache whose root was nearest in the first frame, its nodes as far along

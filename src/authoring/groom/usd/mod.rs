@@ -1,8 +1,8 @@
 //! USD files with curves, read: `.usda`, `.usdc`, `.usdz` (feature `usd`).
 //!
 //! All curve sets of a stage become one groom, in the order of the prims and with the transforms above them
-//! applied; the earliest sample of what is animated counts, and a [`GroomCache`](super::GroomCache) has all. The file says its unit and axis: `metersPerUnit` and
-//! `upAxis`, without which USD takes centimetres and Y.
+//! applied; the earliest sample of what is animated counts, and a [`GroomCache`](super::GroomCache) has all. The file
+//! says its unit and axis: `metersPerUnit` and `upAxis`, without which USD takes centimetres and Y.
 //!
 //! | curves | become |
 //! |---|---|
